@@ -1,0 +1,10 @@
+//! The mathematics of `handeye`: geometry, solving, information and planning for hand-eye calibration.
+//!
+//! No Python, no files, no clock, no global randomness. Transforms are `T_to_from`; lengths are metres,
+//! angles radians, pixels have their centres at integer coordinates.
+
+pub mod camera;
+pub mod closed_form;
+pub mod error;
+pub mod se3;
+pub mod testing;
