@@ -1,0 +1,107 @@
+# Every target sets up what it needs in .venv, says what it is doing, and works offline once set up.
+# Needed beforehand: Python 3.11 or later, a Rust toolchain, make, and a package registry for the first run.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMPS := $(VENV)/.stamps
+
+# Public recordings, used by the longer tests and studies when they lie beside the clone.
+ifeq ($(HANDEYE_DATA),)
+ifneq ($(wildcard ../shared/data),)
+export HANDEYE_DATA := $(abspath ../shared/data)
+endif
+endif
+
+# The compiled extension finds its interpreter, and maturin its environment, without an activated shell.
+export VIRTUAL_ENV := $(abspath $(VENV))
+export PYO3_PYTHON := $(abspath $(BIN)/python)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+RUST_SOURCES := $(shell find crates -type f \( -name '*.rs' -o -name Cargo.toml \))
+EXTENSION := $(wildcard python/handeye/_core*.so python/handeye/_core*.pyd)
+
+say = @printf '== %s\n'
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test check bench docs build lock clean distclean FORCE
+
+help: ## list the targets
+	@printf 'handeye: make TARGET, one of\n'
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: build ## replay a shipped recording under three policies, print the table, draw the picture
+	$(say) 'handeye demo'
+	@$(BIN)/handeye demo
+
+test: check ## everything: the checks, the Rust tests, the Python tests, every example, every command in the README
+	$(say) 'cargo test'
+	@cargo test --workspace --locked --quiet
+	$(say) 'pytest'
+	@$(BIN)/python -m pytest
+
+check: build $(STAMPS)/dev ## format, lint, types, import directions
+	$(say) 'cargo fmt --check'
+	@cargo fmt --all --check
+	$(say) 'cargo clippy'
+	@cargo clippy --workspace --all-targets --locked --quiet -- -D warnings
+	$(say) 'ruff check'
+	@$(BIN)/ruff check .
+	$(say) 'ruff format --check'
+	@$(BIN)/ruff format --check .
+	$(say) 'pyright'
+	@$(BIN)/pyright --pythonpath $(BIN)/python
+	$(say) 'lint-imports'
+	@$(BIN)/lint-imports
+
+bench: build $(STAMPS)/dev ## measure the core and the Python side on this machine
+	$(say) 'benchmarks'
+	@cargo bench --package handeye-core --locked
+	@for script in $(sort $(wildcard benchmarks/*.py)); do \
+		printf '== %s\n' "$$script"; $(BIN)/python "$$script" || exit 1; \
+	done
+
+docs: $(STAMPS)/dev ## build the documentation into docs/_build/html
+	$(say) 'sphinx-build docs docs/_build/html'
+	@$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	$(say) 'written: docs/_build/html/index.html'
+
+build: $(STAMPS)/core ## build the Rust extension and install the package, editable, into .venv
+
+$(STAMPS)/run: requirements/run.txt
+	@command -v $(PYTHON) >/dev/null || { echo 'Python 3.11 or later is needed: make PYTHON=/path/to/python3' >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo 'Python 3.11 or later is needed; this one is older. Try: make PYTHON=python3.12' >&2; exit 1; }
+	@test -x $(BIN)/python || { printf '== %s\n' 'creating the virtual environment $(VENV)'; $(PYTHON) -m venv $(VENV); }
+	$(say) 'installing the pinned packages of requirements/run.txt (a minute the first time)'
+	@$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements/run.txt
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/dev: requirements/dev.txt $(STAMPS)/run
+	$(say) 'installing the pinned packages of requirements/dev.txt (a minute the first time)'
+	@$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements/dev.txt
+	@mkdir -p $(STAMPS) && touch $@
+
+# Rebuilt only when something it is made of has changed, or when the built library has been removed.
+$(STAMPS)/core: $(STAMPS)/run $(RUST_SOURCES) Cargo.toml Cargo.lock pyproject.toml $(if $(EXTENSION),,FORCE)
+	@command -v cargo >/dev/null || { echo 'a Rust toolchain (cargo, rustc) is needed' >&2; exit 1; }
+	$(say) 'building the Rust core (minutes the first time, seconds afterwards)'
+	@$(BIN)/maturin develop --release --locked --quiet
+	@touch $@
+
+FORCE:
+
+# The files it writes carry hashes and no addresses.
+lock: requirements/pins.txt pyproject.toml ## resolve requirements/*.txt anew from pyproject.toml (needs the registry)
+	$(say) 'resolving requirements/dev.txt and requirements/run.txt'
+	@$(PYTHON) tools/lock.py
+
+clean: ## remove what was built; keep .venv
+	$(say) 'removing build products and caches'
+	@rm -rf target build docs/_build out .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	@rm -f python/handeye/_core*.so python/handeye/_core*.pyd $(STAMPS)/core
+	@find python tests examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+
+distclean: clean ## remove .venv too
+	@rm -rf $(VENV)
