@@ -11,7 +11,7 @@ pub fn numerical_jacobian<const M: usize, const N: usize>(
     f: impl Fn(&SVector<f64, N>) -> SVector<f64, M>,
 ) -> SMatrix<f64, M, N> {
     let step = 1e-6;
-    let mut jacobian = SMatrix::zeros();
+    let mut jacobian = SMatrix::<f64, M, N>::zeros();
     for i in 0..N {
         let mut ahead = *at;
         let mut behind = *at;

@@ -1,14 +1,26 @@
 //! Camera models: from a point in the camera frame to a pixel, with analytic derivatives.
 //!
 //! The camera frame is OpenCV's: x right, y down, z forward; pixel centres at integers.
-//! One file per lens; [`Camera`] holds which lens it is and its parameters.
+//! One file per lens family. A lens maps the plane at unit depth to itself; [`Camera`] adds the perspective
+//! division before it and the focal lengths and principal point after it.
 
-use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
+mod brown_conrady;
+mod kannala_brandt;
+mod pinhole;
+mod region;
+
+use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
 
 use crate::error::Error;
 
 /// Most parameters a lens can have (Brown-Conrady with 12 coefficients).
 pub const MAX_PARAMETERS: usize = 16;
+
+/// Points nearer to the camera's plane than this, in metres, count as behind it.
+pub const MIN_DEPTH_M: f64 = 1e-6;
+
+/// Largest magnitude of a parameter: far beyond any lens, small enough that no product overflows.
+const MAX_MAGNITUDE: f64 = 1e12;
 
 /// Derivative of a pixel in the camera parameters; columns beyond the lens' count are zero.
 pub type ParameterJacobian = SMatrix<f64, 2, MAX_PARAMETERS>;
@@ -30,6 +42,53 @@ pub enum Lens {
     KannalaBrandt,
 }
 
+impl Lens {
+    /// All lenses.
+    pub const ALL: [Self; 6] = [
+        Self::Pinhole,
+        Self::BrownConrady4,
+        Self::BrownConrady5,
+        Self::BrownConrady8,
+        Self::BrownConrady12,
+        Self::KannalaBrandt,
+    ];
+
+    /// Number of parameters, focal lengths and principal point included.
+    #[inline]
+    pub const fn parameter_count(self) -> usize {
+        match self {
+            Self::Pinhole => 4,
+            Self::BrownConrady4 | Self::KannalaBrandt => 8,
+            Self::BrownConrady5 => 9,
+            Self::BrownConrady8 => 12,
+            Self::BrownConrady12 => 16,
+        }
+    }
+
+    /// The name in files and messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pinhole => "pinhole",
+            Self::BrownConrady4 => "brown_conrady_4",
+            Self::BrownConrady5 => "brown_conrady_5",
+            Self::BrownConrady8 => "brown_conrady_8",
+            Self::BrownConrady12 => "brown_conrady_12",
+            Self::KannalaBrandt => "kannala_brandt",
+        }
+    }
+
+    /// The lens of a name.
+    ///
+    /// # Errors
+    /// [`Error::InvalidInput`] that lists the names there are.
+    pub fn from_name(name: &str) -> Result<Self, Error> {
+        Self::ALL.into_iter().find(|lens| lens.name() == name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            Error::invalid(format!("unknown lens \"{name}\"; the lenses are {names}"))
+        })
+    }
+}
+
 /// A pixel with its derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Projection {
@@ -41,11 +100,207 @@ pub struct Projection {
     pub d_parameters: ParameterJacobian,
 }
 
-/// A camera: a lens and its parameters `fx, fy, cx, cy, distortion...`.
+/// A point of the plane at unit depth after the lens, with its derivative in the point before the lens.
+#[derive(Clone, Copy, Debug)]
+struct Bent {
+    x: f64,
+    y: f64,
+    /// `[[dx/dx0, dx/dy0], [dy/dx0, dy/dy0]]`.
+    jacobian: Matrix2<f64>,
+}
+
+/// A camera: a lens and its parameters `fx, fy, cx, cy, distortion...`, validated.
+///
+/// The fields are for reading; make a changed camera with [`Camera::new`] or [`Camera::plus`], which also find
+/// out anew where the lens is valid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Which lens.
     pub lens: Lens,
-    /// Its parameters; the first `lens.parameter_count()` count.
+    /// Its parameters; the first `lens.parameter_count()` count, the others are zero.
     pub parameters: [f64; MAX_PARAMETERS],
+    /// Up to this squared radius in the plane at unit depth the lens is valid.
+    max_squared_radius: f64,
 }
+
+impl Camera {
+    /// A camera from all parameters of its lens.
+    ///
+    /// # Errors
+    /// [`Error::InvalidInput`] for a wrong count, a parameter that is not finite (or beyond 1e12), or a
+    /// focal length that is not positive.
+    pub fn new(lens: Lens, parameters: &[f64]) -> Result<Self, Error> {
+        let count = lens.parameter_count();
+        if parameters.len() != count {
+            return Err(Error::invalid(format!(
+                "lens \"{}\" has {count} parameters, found {}",
+                lens.name(),
+                parameters.len()
+            )));
+        }
+        let mut padded = [0.0; MAX_PARAMETERS];
+        padded[..count].copy_from_slice(parameters);
+        if let Some(i) = padded.iter().position(|p| p.is_nan() || p.abs() > MAX_MAGNITUDE) {
+            return Err(Error::invalid(format!(
+                "camera parameter {i} is {}: not a finite number of sensible size",
+                padded[i]
+            )));
+        }
+        if padded[0] <= 0.0 || padded[1] <= 0.0 {
+            return Err(Error::invalid(format!(
+                "focal lengths must be positive pixels, found fx = {}, fy = {}",
+                padded[0], padded[1]
+            )));
+        }
+        let max_squared_radius = match lens {
+            Lens::Pinhole => region::MAX_SQUARED_RADIUS,
+            Lens::KannalaBrandt => kannala_brandt::max_squared_radius(&padded),
+            _ => brown_conrady::max_squared_radius(&padded),
+        };
+        Ok(Self { lens, parameters: padded, max_squared_radius })
+    }
+
+    /// The camera with `delta` added to its parameters; entries beyond the lens' count are ignored.
+    ///
+    /// # Errors
+    /// As [`Camera::new`].
+    pub fn plus(&self, delta: &[f64]) -> Result<Self, Error> {
+        let mut parameters = self.parameters;
+        parameters.iter_mut().zip(delta).for_each(|(p, d)| *p += d);
+        Self::new(self.lens, &parameters[..self.lens.parameter_count()])
+    }
+
+    /// The point at unit depth after the lens; None outside the region where the lens is one-to-one.
+    #[inline]
+    fn bend(&self, x: f64, y: f64) -> Option<Bent> {
+        let p = &self.parameters;
+        // Written so that NaN falls through to None.
+        if x * x + y * y <= self.max_squared_radius {
+            let bent = match self.lens {
+                Lens::Pinhole => return Some(pinhole::bend(x, y)),
+                Lens::BrownConrady4 | Lens::BrownConrady5 => brown_conrady::bend::<false, false>(p, x, y),
+                Lens::BrownConrady8 => brown_conrady::bend::<true, false>(p, x, y),
+                Lens::BrownConrady12 => brown_conrady::bend::<true, true>(p, x, y),
+                Lens::KannalaBrandt => kannala_brandt::bend(p, x, y),
+            };
+            // The radius covers the radial part; decentring and prism can fold the plane a little earlier.
+            if bent.jacobian.determinant() > 0.0 {
+                return Some(bent);
+            }
+        }
+        None
+    }
+
+    /// Derivative of the point after the lens in the distortion coefficients, parameters 4 and on.
+    #[inline]
+    fn bend_coefficients(&self, x: f64, y: f64, out: &mut ParameterJacobian) {
+        let p = &self.parameters;
+        match self.lens {
+            Lens::Pinhole => {}
+            Lens::BrownConrady4 => brown_conrady::coefficients::<8>(p, x, y, out),
+            Lens::BrownConrady5 => brown_conrady::coefficients::<9>(p, x, y, out),
+            Lens::BrownConrady8 => brown_conrady::coefficients::<12>(p, x, y, out),
+            Lens::BrownConrady12 => brown_conrady::coefficients::<16>(p, x, y, out),
+            Lens::KannalaBrandt => kannala_brandt::coefficients(x, y, out),
+        }
+    }
+
+    /// Focal lengths and principal point applied to a point after the lens.
+    #[inline]
+    fn to_pixel(&self, x: f64, y: f64) -> Vector2<f64> {
+        let p = &self.parameters;
+        Vector2::new(p[0] * x + p[2], p[1] * y + p[3])
+    }
+
+    /// Finishes a derivative in the parameters that holds the unscaled columns 4 and on.
+    #[inline]
+    fn finish_parameters(&self, x: f64, y: f64, jacobian: &mut ParameterJacobian) {
+        let p = &self.parameters;
+        for i in 4..self.lens.parameter_count() {
+            jacobian[(0, i)] *= p[0];
+            jacobian[(1, i)] *= p[1];
+        }
+        jacobian[(0, 0)] = x;
+        jacobian[(1, 1)] = y;
+        jacobian[(0, 2)] = 1.0;
+        jacobian[(1, 3)] = 1.0;
+    }
+
+    /// Pixel of a point in the camera frame; None where the lens does not see it.
+    #[inline]
+    pub fn project(&self, point: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let (x, y, _) = at_unit_depth(point)?;
+        let bent = self.bend(x, y)?;
+        Some(self.to_pixel(bent.x, bent.y))
+    }
+
+    /// Pixel and its derivative in the point.
+    #[inline]
+    pub fn project_with_point_derivative(
+        &self,
+        point: &Vector3<f64>,
+    ) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        let (x, y, inverse_depth) = at_unit_depth(point)?;
+        let bent = self.bend(x, y)?;
+        Some((self.to_pixel(bent.x, bent.y), self.point_derivative(x, y, inverse_depth, &bent.jacobian)))
+    }
+
+    /// Pixel and its derivatives in the point and in the camera parameters.
+    #[inline]
+    pub fn project_with_derivatives(&self, point: &Vector3<f64>) -> Option<Projection> {
+        let (x, y, inverse_depth) = at_unit_depth(point)?;
+        let bent = self.bend(x, y)?;
+        let mut d_parameters = ParameterJacobian::zeros();
+        self.bend_coefficients(x, y, &mut d_parameters);
+        self.finish_parameters(bent.x, bent.y, &mut d_parameters);
+        Some(Projection {
+            pixel: self.to_pixel(bent.x, bent.y),
+            d_point: self.point_derivative(x, y, inverse_depth, &bent.jacobian),
+            d_parameters,
+        })
+    }
+
+    #[inline]
+    fn point_derivative(&self, x: f64, y: f64, inverse_depth: f64, lens: &Matrix2<f64>) -> Matrix2x3<f64> {
+        let fx = self.parameters[0] * inverse_depth;
+        let fy = self.parameters[1] * inverse_depth;
+        let (a, b, c, d) = (fx * lens.m11, fx * lens.m12, fy * lens.m21, fy * lens.m22);
+        Matrix2x3::new(a, b, -(a * x + b * y), c, d, -(c * x + d * y))
+    }
+
+    /// Unit vector, camera frame, along the ray of a pixel; None where no point that the lens sees has it.
+    pub fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
+        let p = &self.parameters;
+        let (u, v) = ((pixel.x - p[2]) / p[0], (pixel.y - p[3]) / p[1]);
+        if !(u.is_finite() && v.is_finite()) {
+            return None;
+        }
+        let (x, y) = match self.lens {
+            Lens::Pinhole => (u, v),
+            Lens::KannalaBrandt => kannala_brandt::straighten(p, self.max_squared_radius, u, v)?,
+            _ => {
+                let start = brown_conrady::straighten_radially(p, self.max_squared_radius, u, v);
+                region::newton(start, (u, v), |x, y| self.bend(x, y))?
+            }
+        };
+        let norm_squared = x * x + y * y;
+        // Written so that NaN falls through to None.
+        if norm_squared <= self.max_squared_radius {
+            return Some(Vector3::new(x, y, 1.0) / (1.0 + norm_squared).sqrt());
+        }
+        None
+    }
+}
+
+/// `x/z, y/z, 1/z`; None behind the camera.
+#[inline]
+fn at_unit_depth(point: &Vector3<f64>) -> Option<(f64, f64, f64)> {
+    if point.z > MIN_DEPTH_M {
+        let inverse_depth = 1.0 / point.z;
+        return Some((point.x * inverse_depth, point.y * inverse_depth, inverse_depth));
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,126 @@
+//! Brown-Conrady distortion with 4, 5, 8 or 12 coefficients, as OpenCV states it.
+//!
+//! Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32(3), 1966; the rational and the thin
+//! prism terms as in OpenCV's documentation of `projectPoints`. With `s = x^2 + y^2`,
+//! `N = 1 + k1 s + k2 s^2 + k3 s^3` and `D = 1 + k4 s + k5 s^2 + k6 s^3`:
+//!
+//! ```text
+//! x' = x N/D + 2 p1 x y + p2 (s + 2 x^2) + s1 s + s2 s^2
+//! y' = y N/D + p1 (s + 2 y^2) + 2 p2 x y + s3 s + s4 s^2
+//! ```
+
+use nalgebra::Matrix2;
+
+use super::region::{self, MAX_SQUARED_RADIUS};
+use super::{Bent, MAX_PARAMETERS, ParameterJacobian};
+
+type Parameters = [f64; MAX_PARAMETERS];
+
+/// Coefficients of the numerator `N` and denominator `D`, lowest power first.
+#[inline]
+fn fraction(p: &Parameters) -> ([f64; 4], [f64; 4]) {
+    ([1.0, p[4], p[5], p[8]], [1.0, p[9], p[10], p[11]])
+}
+
+/// The point after the lens; `RATIONAL` and `PRISM` say whether `k4..k6` and `s1..s4` can differ from zero.
+#[inline]
+pub(super) fn bend<const RATIONAL: bool, const PRISM: bool>(p: &Parameters, x: f64, y: f64) -> Bent {
+    let (k1, k2, p1, p2, k3) = (p[4], p[5], p[6], p[7], p[8]);
+    let (xx, yy, xy) = (x * x, y * y, x * y);
+    let s = xx + yy;
+    let mut radial = 1.0 + s * (k1 + s * (k2 + s * k3));
+    let mut slope = k1 + s * (2.0 * k2 + 3.0 * s * k3);
+    if RATIONAL {
+        let (k4, k5, k6) = (p[9], p[10], p[11]);
+        let inverse = 1.0 / (1.0 + s * (k4 + s * (k5 + s * k6)));
+        radial *= inverse;
+        slope = (slope - radial * (k4 + s * (2.0 * k5 + 3.0 * s * k6))) * inverse;
+    }
+    let cross = 2.0 * (xy * slope + p1 * x + p2 * y);
+    let mut bent = Bent {
+        x: x * radial + 2.0 * p1 * xy + p2 * (s + 2.0 * xx),
+        y: y * radial + p1 * (s + 2.0 * yy) + 2.0 * p2 * xy,
+        jacobian: Matrix2::new(
+            radial + 2.0 * (xx * slope + p1 * y) + 6.0 * p2 * x,
+            cross,
+            cross,
+            radial + 2.0 * (yy * slope + p2 * x) + 6.0 * p1 * y,
+        ),
+    };
+    if PRISM {
+        let (s1, s2, s3, s4) = (p[12], p[13], p[14], p[15]);
+        bent.x += s * (s1 + s * s2);
+        bent.y += s * (s3 + s * s4);
+        let (along_x, along_y) = (2.0 * (s1 + 2.0 * s * s2), 2.0 * (s3 + 2.0 * s * s4));
+        bent.jacobian += Matrix2::new(along_x * x, along_x * y, along_y * x, along_y * y);
+    }
+    bent
+}
+
+/// Derivative of the point after the lens in the coefficients: columns 4 to `COUNT` of `out`.
+#[inline]
+pub(super) fn coefficients<const COUNT: usize>(p: &Parameters, x: f64, y: f64, out: &mut ParameterJacobian) {
+    let s = x * x + y * y;
+    let mut set = |column: usize, dx: f64, dy: f64| {
+        out[(0, column)] = dx;
+        out[(1, column)] = dy;
+    };
+    let mut weight = 1.0;
+    if COUNT >= 12 {
+        let (n, d) = fraction(p);
+        weight = 1.0 / region::value(&d, s);
+        let radial = region::value(&n, s) * weight;
+        let mut power = -radial * weight;
+        for column in 9..12 {
+            power *= s;
+            set(column, x * power, y * power);
+        }
+    }
+    let (first, second, third) = (weight * s, weight * s * s, weight * s * s * s);
+    set(4, x * first, y * first);
+    set(5, x * second, y * second);
+    set(6, 2.0 * x * y, s + 2.0 * y * y);
+    set(7, s + 2.0 * x * x, 2.0 * x * y);
+    if COUNT >= 9 {
+        set(8, x * third, y * third);
+    }
+    if COUNT >= 16 {
+        set(12, s, 0.0);
+        set(13, s * s, 0.0);
+        set(14, 0.0, s);
+        set(15, 0.0, s * s);
+    }
+}
+
+/// Squared radius up to which the radial mapping `r N/D` rises and `D` is positive.
+///
+/// `d/dr (r N/D) = (N D + 2 s (N' D - N D')) / D^2`, so it rises up to the first root of that numerator.
+pub(super) fn max_squared_radius(p: &Parameters) -> f64 {
+    let (n, d) = fraction(p);
+    let mut rising = [0.0; 7];
+    for (i, a) in n.iter().enumerate() {
+        for (j, b) in d.iter().enumerate() {
+            rising[i + j] += a * b * (1.0 + 2.0 * (i as f64 - j as f64));
+        }
+    }
+    let fold = region::first_root(&rising, MAX_SQUARED_RADIUS);
+    let pole = region::first_root(&d, MAX_SQUARED_RADIUS);
+    fold.min(pole)
+}
+
+/// The point before the lens if it were purely radial: the start for Newton's method.
+pub(super) fn straighten_radially(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> (f64, f64) {
+    let target = u.hypot(v);
+    if target == 0.0 {
+        return (0.0, 0.0);
+    }
+    let (n, d) = fraction(p);
+    let radius = region::rising_root(target, max_squared_radius.sqrt(), |r| {
+        let s = r * r;
+        let denominator = region::value(&d, s);
+        let radial = region::value(&n, s) / denominator;
+        let slope = (region::derivative(&n, s) - radial * region::derivative(&d, s)) / denominator;
+        (r * radial, radial + 2.0 * s * slope)
+    });
+    (u * radius / target, v * radius / target)
+}

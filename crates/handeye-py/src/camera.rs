@@ -1,0 +1,101 @@
+//! Projection and its inverse, batched.
+
+use handeye_core::camera::{Camera, Lens, ParameterJacobian, Projection};
+use nalgebra::{Matrix2x3, Vector2, Vector3};
+use numpy::{IntoPyArray, PyArray1, PyArrayDyn};
+use pyo3::prelude::*;
+
+use crate::convert::{self, Array};
+use crate::errors::to_python;
+
+/// Registers the functions of this file.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(lens_parameter_count, module)?)?;
+    module.add_function(wrap_pyfunction!(project, module)?)?;
+    module.add_function(wrap_pyfunction!(project_jacobians, module)?)?;
+    module.add_function(wrap_pyfunction!(unproject, module)?)
+}
+
+type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
+type Flags<'py> = Bound<'py, PyArray1<bool>>;
+
+const NAN_PIXEL: Vector2<f64> = Vector2::new(f64::NAN, f64::NAN);
+
+/// The camera of a lens name and its parameters.
+pub fn camera(py: Python<'_>, lens: &str, parameters: &Array<'_>) -> PyResult<Camera> {
+    let parameters = convert::scalars(py, "parameters", parameters)?;
+    Lens::from_name(lens)
+        .and_then(|lens| Camera::new(lens, &parameters))
+        .map_err(|error| to_python(py, error))
+}
+
+#[pyfunction]
+fn lens_parameter_count(py: Python<'_>, lens: &str) -> PyResult<usize> {
+    Lens::from_name(lens).map(Lens::parameter_count).map_err(|error| to_python(py, error))
+}
+
+#[pyfunction]
+fn project<'py>(
+    py: Python<'py>,
+    lens: &str,
+    parameters: Array<'py>,
+    points_camera: Array<'py>,
+) -> PyResult<(Floats<'py>, Flags<'py>)> {
+    let camera = camera(py, lens, &parameters)?;
+    let points = convert::vectors::<3>(py, "points_camera", &points_camera)?;
+    let pixels: Vec<_> = py.detach(|| points.iter().map(|p| camera.project(p)).collect());
+    Ok(optional_out(py, &pixels, NAN_PIXEL))
+}
+
+#[pyfunction]
+fn project_jacobians<'py>(
+    py: Python<'py>,
+    lens: &str,
+    parameters: Array<'py>,
+    points_camera: Array<'py>,
+) -> PyResult<(Floats<'py>, Floats<'py>, Floats<'py>, Flags<'py>)> {
+    let camera = camera(py, lens, &parameters)?;
+    let points = convert::vectors::<3>(py, "points_camera", &points_camera)?;
+    let projections: Vec<_> =
+        py.detach(|| points.iter().map(|p| camera.project_with_derivatives(p)).collect());
+    let unseen = Projection {
+        pixel: NAN_PIXEL,
+        d_point: Matrix2x3::repeat(f64::NAN),
+        d_parameters: ParameterJacobian::repeat(f64::NAN),
+    };
+    let valid: Vec<bool> = projections.iter().map(Option::is_some).collect();
+    let all: Vec<Projection> = projections.into_iter().map(|p| p.unwrap_or(unseen)).collect();
+    let pixels: Vec<_> = all.iter().map(|p| p.pixel).collect();
+    let d_point: Vec<_> = all.iter().map(|p| p.d_point).collect();
+    let d_parameters: Vec<_> = all.iter().map(|p| p.d_parameters).collect();
+    Ok((
+        convert::vectors_out(py, &pixels),
+        convert::matrices_out(py, &d_point),
+        convert::matrices_columns_out(py, &d_parameters, camera.lens.parameter_count()),
+        valid.into_pyarray(py),
+    ))
+}
+
+#[pyfunction]
+fn unproject<'py>(
+    py: Python<'py>,
+    lens: &str,
+    parameters: Array<'py>,
+    uv: Array<'py>,
+) -> PyResult<(Floats<'py>, Flags<'py>)> {
+    let camera = camera(py, lens, &parameters)?;
+    let pixels = convert::vectors::<2>(py, "uv", &uv)?;
+    let rays: Vec<_> = py.detach(|| pixels.iter().map(|p| camera.unproject(p)).collect());
+    Ok(optional_out(py, &rays, Vector3::repeat(f64::NAN)))
+}
+
+/// Vectors with NaN rows where there is none, and which there are.
+fn optional_out<'py, const D: usize>(
+    py: Python<'py>,
+    vectors: &[Option<nalgebra::SVector<f64, D>>],
+    missing: nalgebra::SVector<f64, D>,
+) -> (Floats<'py>, Flags<'py>) {
+    let valid: Vec<bool> = vectors.iter().map(Option::is_some).collect();
+    let filled: Vec<_> = vectors.iter().map(|v| v.unwrap_or(missing)).collect();
+    (convert::vectors_out(py, &filled), valid.into_pyarray(py))
+}

@@ -1,0 +1,132 @@
+//! numpy to nalgebra and back, with shape checks that name the argument.
+//!
+//! Everything is copied on the way in, so that the interpreter lock can be released afterwards.
+
+use handeye_core::se3::Se3;
+use nalgebra::{Matrix4, SMatrix, SVector};
+use numpy::ndarray::{ArrayD, Axis, IxDyn};
+use numpy::{AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::errors::{invalid, to_python};
+
+/// Anything that `numpy.asarray(..., float64)` accepts.
+pub type Array<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
+
+/// Checks a shape against a pattern; `None` stands for any size.
+fn check_shape(py: Python<'_>, name: &str, array: &Array<'_>, pattern: &[Option<usize>]) -> PyResult<()> {
+    let shape = array.shape();
+    let fits =
+        shape.len() == pattern.len() && shape.iter().zip(pattern).all(|(n, p)| p.is_none_or(|p| p == *n));
+    if fits {
+        return Ok(());
+    }
+    let expected: Vec<String> =
+        pattern.iter().map(|p| p.map_or_else(|| "N".to_owned(), |p| p.to_string())).collect();
+    let found: Vec<String> = shape.iter().map(ToString::to_string).collect();
+    Err(invalid(py, &format!("{name} must have shape ({}), found ({})", expected.join(", "), found.join(", "))))
+}
+
+/// Rows of an `(N, D)` array.
+pub fn vectors<const D: usize>(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Vec<SVector<f64, D>>> {
+    check_shape(py, name, array, &[None, Some(D)])?;
+    let view = array.as_array();
+    Ok(view.axis_iter(Axis(0)).map(|row| SVector::from_iterator(row.iter().copied())).collect())
+}
+
+/// Entries of an `(N,)` array.
+pub fn scalars(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Vec<f64>> {
+    check_shape(py, name, array, &[None])?;
+    Ok(array.as_array().iter().copied().collect())
+}
+
+/// Matrices of an `(N, R, C)` array.
+pub fn matrices<const R: usize, const C: usize>(
+    py: Python<'_>,
+    name: &str,
+    array: &Array<'_>,
+) -> PyResult<Vec<SMatrix<f64, R, C>>> {
+    check_shape(py, name, array, &[None, Some(R), Some(C)])?;
+    let view = array.as_array();
+    Ok(view.axis_iter(Axis(0)).map(|m| SMatrix::from_row_iterator(m.iter().copied())).collect())
+}
+
+/// One `(R, C)` matrix.
+pub fn matrix<const R: usize, const C: usize>(
+    py: Python<'_>,
+    name: &str,
+    array: &Array<'_>,
+) -> PyResult<SMatrix<f64, R, C>> {
+    check_shape(py, name, array, &[Some(R), Some(C)])?;
+    Ok(SMatrix::from_row_iterator(array.as_array().iter().copied()))
+}
+
+/// One rigid transform out of a `(4, 4)` array.
+pub fn transform(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Se3> {
+    rigid(py, name, &matrix::<4, 4>(py, name, array)?)
+}
+
+/// Rigid transforms out of an `(N, 4, 4)` array; an error names the index.
+pub fn transforms(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Vec<Se3>> {
+    let matrices = matrices::<4, 4>(py, name, array)?;
+    matrices.iter().enumerate().map(|(i, m)| rigid(py, &format!("{name}[{i}]"), m)).collect()
+}
+
+fn rigid(py: Python<'_>, name: &str, m: &Matrix4<f64>) -> PyResult<Se3> {
+    Se3::from_matrix(m).map_err(|error| {
+        let error = to_python(py, error);
+        let message = format!("{name} is {}", error.value(py));
+        match error.value(py).setattr("args", (message,)) {
+            Ok(()) => error,
+            Err(broken) => broken,
+        }
+    })
+}
+
+/// An array of the given shape from its entries in row-major order.
+fn array<'py>(py: Python<'py>, shape: &[usize], entries: Vec<f64>) -> Bound<'py, PyArrayDyn<f64>> {
+    ArrayD::from_shape_vec(IxDyn(shape), entries)
+        .expect("as many entries as the shape says, by construction")
+        .into_pyarray(py)
+}
+
+/// An `(N, D)` array.
+pub fn vectors_out<'py, const D: usize>(
+    py: Python<'py>,
+    vectors: &[SVector<f64, D>],
+) -> Bound<'py, PyArrayDyn<f64>> {
+    array(py, &[vectors.len(), D], vectors.iter().flat_map(|v| v.iter().copied()).collect())
+}
+
+/// An `(R, C)` array.
+pub fn matrix_out<'py, const R: usize, const C: usize>(
+    py: Python<'py>,
+    m: &SMatrix<f64, R, C>,
+) -> Bound<'py, PyArrayDyn<f64>> {
+    array(py, &[R, C], m.transpose().iter().copied().collect())
+}
+
+/// An `(N, R, C)` array.
+pub fn matrices_out<'py, const R: usize, const C: usize>(
+    py: Python<'py>,
+    matrices: &[SMatrix<f64, R, C>],
+) -> Bound<'py, PyArrayDyn<f64>> {
+    matrices_columns_out(py, matrices, C)
+}
+
+/// An `(N, R, columns)` array of the first columns of each matrix.
+pub fn matrices_columns_out<'py, const R: usize, const C: usize>(
+    py: Python<'py>,
+    matrices: &[SMatrix<f64, R, C>],
+    columns: usize,
+) -> Bound<'py, PyArrayDyn<f64>> {
+    let entry = |m: &SMatrix<f64, R, C>, i: usize| m[(i / columns, i % columns)];
+    let entries = matrices.iter().flat_map(|m| (0..R * columns).map(move |i| entry(m, i))).collect();
+    array(py, &[matrices.len(), R, columns], entries)
+}
+
+/// An `(N, 4, 4)` array of transforms.
+pub fn transforms_out<'py>(py: Python<'py>, transforms: &[Se3]) -> Bound<'py, PyArrayDyn<f64>> {
+    let matrices: Vec<Matrix4<f64>> = transforms.iter().map(Se3::to_matrix).collect();
+    matrices_out(py, &matrices)
+}

@@ -1,0 +1,45 @@
+//! The group of rigid transforms, batched.
+
+use handeye_core::se3::Se3;
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+
+use crate::convert::{self, Array};
+
+/// Registers the functions of this file.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(se3_exp, module)?)?;
+    module.add_function(wrap_pyfunction!(se3_log, module)?)?;
+    module.add_function(wrap_pyfunction!(se3_adjoint, module)?)?;
+    module.add_function(wrap_pyfunction!(nearest_rigid, module)?)
+}
+
+#[pyfunction]
+fn se3_exp<'py>(py: Python<'py>, xi: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let twists = convert::vectors::<6>(py, "xi", &xi)?;
+    let transforms: Vec<Se3> = py.detach(|| twists.iter().map(Se3::exp).collect());
+    Ok(convert::transforms_out(py, &transforms))
+}
+
+#[pyfunction]
+#[pyo3(signature = (transforms, /))]
+fn se3_log<'py>(py: Python<'py>, transforms: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let transforms = convert::transforms(py, "T", &transforms)?;
+    let twists: Vec<_> = py.detach(|| transforms.iter().map(Se3::log).collect());
+    Ok(convert::vectors_out(py, &twists))
+}
+
+#[pyfunction]
+#[pyo3(signature = (transforms, /))]
+fn se3_adjoint<'py>(py: Python<'py>, transforms: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let transforms = convert::transforms(py, "T", &transforms)?;
+    let adjoints: Vec<_> = py.detach(|| transforms.iter().map(Se3::adjoint).collect());
+    Ok(convert::matrices_out(py, &adjoints))
+}
+
+#[pyfunction]
+#[pyo3(signature = (transform, /))]
+fn nearest_rigid<'py>(py: Python<'py>, transform: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let transform = convert::transform(py, "T", &transform)?;
+    Ok(convert::matrix_out(py, &transform.to_matrix()))
+}

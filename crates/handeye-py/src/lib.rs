@@ -1,0 +1,17 @@
+//! The extension module `handeye._core`: extract, release the interpreter lock, call the core, wrap.
+//!
+//! Nothing is decided here. Each file registers its own functions.
+
+use pyo3::prelude::*;
+
+mod camera;
+mod convert;
+mod errors;
+mod geometry;
+
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    camera::register(module)?;
+    geometry::register(module)?;
+    Ok(())
+}

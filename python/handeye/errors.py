@@ -1,0 +1,83 @@
+"""The one family of errors, each with its exit code for the command line.
+
+A failure is never answered with a plausible value: it raises one of these, with a message that names what was
+found and what was expected, a `code` that a script can compare, and a `hint` that says what to do.
+"""
+
+from enum import IntEnum
+from typing import ClassVar
+
+
+class ExitCode(IntEnum):
+    """Exit codes of the command line."""
+
+    SUCCESS = 0
+    USAGE = 2
+    UNUSABLE_INPUT = 3
+    DEGENERATE = 4
+    DETECTION = 5
+    SOLVE = 6
+    OUTPUT = 7
+    INTERRUPTED = 130
+
+
+class HandeyeError(Exception):
+    """Base of all errors that `handeye` raises on purpose.
+
+    Parameters
+    ----------
+    message
+        What was found and what was expected, for a person.
+    code
+        A stable lower-case word for scripts, such as `not_rigid`; by default the `default_code` of the class.
+    hint
+        What to do about it, or None.
+    """
+
+    exit_code: ClassVar[ExitCode] = ExitCode.SOLVE
+    default_code: ClassVar[str] = "error"
+
+    def __init__(self, message: str, *, code: str | None = None, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.code = self.default_code if code is None else code
+        self.hint = hint
+
+    @property
+    def message(self) -> str:
+        """What was found and what was expected."""
+        return str(self.args[0])
+
+
+class InputError(HandeyeError):
+    """The input cannot be used: a wrong shape, a file that is not what it claims, a value out of its range."""
+
+    exit_code = ExitCode.UNUSABLE_INPUT
+    default_code = "invalid_input"
+
+
+class DegenerateError(HandeyeError):
+    """The views leave directions of the answer undetermined."""
+
+    exit_code = ExitCode.DEGENERATE
+    default_code = "degenerate"
+
+
+class DetectionError(HandeyeError):
+    """The target was not found in an image."""
+
+    exit_code = ExitCode.DETECTION
+    default_code = "not_detected"
+
+
+class SolveError(HandeyeError):
+    """A numerical step failed or did not converge."""
+
+    exit_code = ExitCode.SOLVE
+    default_code = "not_solved"
+
+
+class OutputError(HandeyeError):
+    """A result cannot be written."""
+
+    exit_code = ExitCode.OUTPUT
+    default_code = "not_written"
