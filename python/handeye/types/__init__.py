@@ -1,0 +1,23 @@
+"""Values that everything else is made of: immutable, and valid if they exist."""
+
+from handeye.types.camera import LENSES, Camera
+from handeye.types.mounting import Mounting
+from handeye.types.pose import Pose
+from handeye.types.recording import Recording, Truth
+from handeye.types.target import AprilGrid, Charuco, Chessboard, CircleGrid, Target
+from handeye.types.view import View
+
+__all__ = [
+    "LENSES",
+    "AprilGrid",
+    "Camera",
+    "Charuco",
+    "Chessboard",
+    "CircleGrid",
+    "Mounting",
+    "Pose",
+    "Recording",
+    "Target",
+    "Truth",
+    "View",
+]

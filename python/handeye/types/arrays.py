@@ -1,0 +1,122 @@
+"""Numbers from outside: checked once, then frozen."""
+
+import operator
+from typing import SupportsIndex
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from handeye.errors import InputError
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+
+def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> FloatArray:
+    """Copy `values` into a read-only float64 array of the given shape.
+
+    Parameters
+    ----------
+    values
+        Anything numpy can turn into an array of real numbers.
+    shape
+        Expected shape; None stands for any length.
+    what
+        Name of the value, for the error message.
+
+    Raises
+    ------
+    InputError
+        Not numbers, another shape, or an entry that is not finite.
+    """
+    array = _numbers(values, what)
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"{what}: expected real numbers, found {array.dtype}", code="not_numbers")
+    _check_shape(array.shape, shape, what)
+    frozen = np.array(array, dtype=np.float64, order="C")
+    finite = np.isfinite(frozen)
+    if not finite.all():
+        where = [int(i) for i in np.argwhere(~finite)[0]]
+        entry = f"entry {where}" if where else "the value"
+        raise InputError(
+            f"{what}: {entry} is {frozen[tuple(where)]}, expected a finite number",
+            code="not_finite",
+            hint="remove the view or repair the file that the number came from",
+        )
+    frozen.flags.writeable = False
+    return frozen
+
+
+def index_array(values: ArrayLike, what: str) -> IndexArray:
+    """Copy `values` into a read-only (N,) int64 array of numbers from 0 upwards.
+
+    Raises
+    ------
+    InputError
+        Not whole numbers, not one-dimensional, or negative.
+    """
+    array = _numbers(values, what)
+    if array.size == 0:
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iu":
+        raise InputError(f"{what}: expected whole numbers, found {array.dtype}", code="not_numbers")
+    _check_shape(array.shape, (None,), what)
+    if array.size and (array.min() < 0 or array.max() > np.iinfo(np.int64).max):
+        raise InputError(f"{what}: {array.min()} to {array.max()}, expected 0 or more", code="out_of_range")
+    frozen = np.array(array, dtype=np.int64, order="C")
+    frozen.flags.writeable = False
+    return frozen
+
+
+def count(value: SupportsIndex, low: int, high: int, what: str) -> int:
+    """Return `value` as an int from `low` to `high`, both included.
+
+    Raises
+    ------
+    InputError
+        Not a whole number, or outside the range.
+    """
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = None
+    if number is None or isinstance(value, bool):
+        raise InputError(f"{what}: {value!r}, expected a whole number", code="not_numbers")
+    if not low <= number <= high:
+        raise InputError(f"{what}: {_short(number)}, expected {low} to {high}", code="out_of_range")
+    return number
+
+
+def positive(value: float, what: str) -> float:
+    """Return `value` as a finite float above zero.
+
+    Raises
+    ------
+    InputError
+        Not a number, not finite, or not above zero.
+    """
+    number = float(finite_array(value, (), what))
+    if number <= 0.0:
+        raise InputError(f"{what}: {number}, expected a number above zero", code="out_of_range")
+    return number
+
+
+def _numbers(values: ArrayLike, what: str) -> NDArray[np.generic]:
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise InputError(f"{what}: not an array of numbers ({error})", code="not_numbers") from error
+
+
+def _check_shape(found: tuple[int, ...], expected: tuple[int | None, ...], what: str) -> None:
+    fits = len(found) == len(expected) and all(
+        want is None or have == want for have, want in zip(found, expected, strict=True)
+    )
+    if not fits:
+        wanted = "(" + ", ".join("N" if want is None else str(want) for want in expected) + ")"
+        raise InputError(f"{what}: shape {found}, expected {wanted}", code="wrong_shape")
+
+
+def _short(number: int) -> str:
+    """Return the digits of a number, unless they would fill the message."""
+    return str(number) if abs(number) < 10**12 else f"a number of {number.bit_length()} bits"

@@ -1,0 +1,208 @@
+"""Rigid transforms.
+
+`T_a_b` maps coordinates in frame b to frame a, so the inner names of a product cancel:
+``T_base_flange @ T_flange_camera`` is ``T_base_camera``.
+"""
+
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from handeye import _core
+from handeye.errors import InputError
+from handeye.types.arrays import FloatArray, finite_array
+
+# Below this deviation from a rotation a matrix is kept bit for bit, so that writing and reading change
+# nothing.
+EXACT_TOLERANCE = 1e-12
+# Longest deviation of the norm of a quaternion from 1: three written digits.
+QUATERNION_NORM_TOLERANCE = 1e-3
+
+
+@final
+class Pose:
+    """A rigid transform of space, immutable.
+
+    Parameters
+    ----------
+    matrix
+        (4, 4) homogeneous matrix, translation in metres. Rounding of the rotation (a deviation from
+        orthogonality up to 1e-4, as in files with four written digits) is repaired by the nearest rotation;
+        a matrix that is rigid to 1e-12 is kept bit for bit.
+
+    Raises
+    ------
+    InputError
+        Not (4, 4), an entry that is not finite, or not rigid: scaled, sheared, mirrored, another last row.
+    """
+
+    __slots__ = ("_matrix",)
+    _matrix: FloatArray
+    # Arrays must not take a pose apart behind our back: `pose @ array` is an error, `np.asarray(pose)` is
+    # meant.
+    __array_ufunc__ = None
+
+    def __init__(self, matrix: ArrayLike) -> None:
+        given = finite_array(matrix, (4, 4), "pose")
+        if np.linalg.det(given[:3, :3]) < 0:
+            raise InputError(
+                "pose: a mirrored (left-handed) frame is not a rigid transform",
+                code="not_rigid",
+                hint="check the order and the signs of the axes",
+            )
+        if not _is_rigid(given):
+            given = finite_array(_core.nearest_rigid(given), (4, 4), "pose")
+        self._matrix = given
+
+    @classmethod
+    def _trusted(cls, matrix: FloatArray) -> "Pose":
+        """Return a pose of a matrix that is rigid by construction."""
+        pose = cls.__new__(cls)
+        matrix.flags.writeable = False
+        pose._matrix = matrix  # noqa: SLF001 - of this class
+        return pose
+
+    @classmethod
+    def identity(cls) -> "Pose":
+        """Return the transform that changes nothing."""
+        return cls._trusted(np.eye(4))
+
+    @classmethod
+    def exp(cls, xi: ArrayLike) -> "Pose":
+        """Return the exponential of a twist `[rho; phi]` (6,): metres, then radians.
+
+        Sola, Deray, Atchuthan, "A micro Lie theory", arXiv 1812.01537, eq. (172).
+
+        Raises
+        ------
+        InputError
+            Not (6,) or not finite.
+        """
+        twist = finite_array(xi, (6,), "twist")
+        return cls(_core.se3_exp(twist[np.newaxis])[0])
+
+    @classmethod
+    def from_quaternion(cls, translation_m: ArrayLike, quaternion_xyzw: ArrayLike) -> "Pose":
+        """Return the pose of a translation (3,) in metres and a quaternion (4,) in the order x, y, z, w.
+
+        Raises
+        ------
+        InputError
+            Not finite, wrong length, or the norm of the quaternion differs from 1 by more than 1e-3.
+        """
+        translation = finite_array(translation_m, (3,), "translation")
+        quaternion = finite_array(quaternion_xyzw, (4,), "quaternion")
+        norm = float(np.linalg.norm(quaternion))
+        if not abs(norm - 1.0) <= QUATERNION_NORM_TOLERANCE:
+            raise InputError(
+                f"quaternion: norm {norm:.6g}, expected 1",
+                code="not_rigid",
+                hint="give the quaternion as x, y, z, w with unit norm",
+            )
+        x, y, z, w = quaternion / norm
+        matrix = np.eye(4)
+        matrix[:3, :3] = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+        matrix[:3, 3] = translation
+        return cls(matrix)
+
+    @property
+    def matrix(self) -> FloatArray:
+        """(4, 4) homogeneous matrix, read-only, translation in metres."""
+        return self._matrix
+
+    @property
+    def rotation(self) -> FloatArray:
+        """(3, 3) rotation matrix, read-only."""
+        return self._matrix[:3, :3]
+
+    @property
+    def translation(self) -> FloatArray:
+        """(3,) translation in metres, read-only."""
+        return self._matrix[:3, 3]
+
+    @property
+    def quaternion_xyzw(self) -> FloatArray:
+        """(4,) unit quaternion in the order x, y, z, w; of the two signs the one with w >= 0."""
+        r = self._matrix
+        # Shepperd's choice of the largest component keeps the division safe at every angle.
+        candidates = np.array(
+            [
+                [1 + r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[2, 1] - r[1, 2]],
+                [r[0, 1] + r[1, 0], 1 - r[0, 0] + r[1, 1] - r[2, 2], r[1, 2] + r[2, 1], r[0, 2] - r[2, 0]],
+                [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1 - r[0, 0] - r[1, 1] + r[2, 2], r[1, 0] - r[0, 1]],
+                [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1 + r[0, 0] + r[1, 1] + r[2, 2]],
+            ]
+        )
+        quaternion = candidates[int(np.argmax(np.diag(candidates)))]
+        return quaternion / np.linalg.norm(quaternion) * (-1.0 if quaternion[3] < 0 else 1.0)
+
+    @property
+    def rotation_angle_rad(self) -> float:
+        """Angle of the rotation, 0 to pi."""
+        r = self.rotation
+        twice_sine = np.linalg.norm([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+        return float(np.arctan2(twice_sine, np.trace(r) - 1.0))
+
+    def inverse(self) -> "Pose":
+        """Return `T_b_a` of `T_a_b`."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.rotation.T
+        matrix[:3, 3] = -(self.rotation.T @ self.translation)
+        return Pose._trusted(matrix)
+
+    def log(self) -> FloatArray:
+        """Return the twist `[rho; phi]` (6,), metres and radians, whose exponential is this pose."""
+        return _core.se3_log(self._matrix[np.newaxis])[0]
+
+    def adjoint(self) -> FloatArray:
+        """Return the (6, 6) adjoint, ``exp(Ad(T) xi) = T exp(xi) T^-1``, for twists `[rho; phi]`."""
+        return _core.se3_adjoint(self._matrix[np.newaxis])[0]
+
+    def act(self, points: ArrayLike) -> FloatArray:
+        """Return points (N, 3) of frame b in frame a, in metres.
+
+        Raises
+        ------
+        InputError
+            Not (N, 3) or not finite.
+        """
+        return finite_array(points, (None, 3), "points") @ self.rotation.T + self.translation
+
+    def to_list(self) -> list[list[float]]:
+        """Return the matrix as four rows of four numbers; `Pose(rows)` reads it back."""
+        return self._matrix.tolist()
+
+    def __matmul__(self, other: "Pose") -> "Pose":
+        if not isinstance(other, Pose):  # pyright: ignore[reportUnnecessaryIsInstance]
+            return NotImplemented
+        return Pose._trusted(self._matrix @ other._matrix)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[np.generic]:
+        return np.array(self._matrix, dtype=dtype, copy=copy)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Pose) and bool(np.array_equal(self._matrix, other._matrix))
+
+    def __hash__(self) -> int:
+        return hash((self._matrix + 0.0).tobytes())  # + 0.0: minus zero equals zero
+
+    def __reduce__(self) -> tuple[type["Pose"], tuple[list[list[float]]]]:
+        return Pose, (self.to_list(),)
+
+    def __repr__(self) -> str:
+        x, y, z = self.translation
+        qx, qy, qz, qw = self.quaternion_xyzw
+        return f"Pose([{x:.6g}, {y:.6g}, {z:.6g}] m, xyzw [{qx:.6g}, {qy:.6g}, {qz:.6g}, {qw:.6g}])"
+
+
+def _is_rigid(matrix: FloatArray) -> bool:
+    """Tell whether a matrix is a rigid transform up to rounding of float64."""
+    rotation = matrix[:3, :3]
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation = np.abs(rotation.T @ rotation - np.eye(3)).max()
+    return bool(np.array_equal(matrix[3], [0, 0, 0, 1]) and deviation <= EXACT_TOLERANCE)

@@ -1,0 +1,88 @@
+"""The grid of AprilTags."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from handeye.errors import InputError
+from handeye.types.arrays import FloatArray, count, positive
+from handeye.types.target.base import Target, check_point_count
+from handeye.types.target.dictionaries import check_dictionary
+
+
+@dataclass(frozen=True)
+class AprilGrid(Target):
+    """A grid of AprilTags laid out as in Kalibr; its points are the four corners of each tag.
+
+    Seen from the front with the tags upright as Kalibr prints them, tag 0 is at the lower left, ids grow to
+    the right and then upwards. Point ``4 tag + k`` is corner k of a tag, counter-clockwise from the lower
+    left: 0 lower left, 1 lower right, 2 upper right, 3 upper left. ::
+
+        11---10  15---14
+        |tag 2|  |tag 3|
+        8-----9  12---13
+        3-----2  7-----6
+        |tag 0|  |tag 1|
+        0-----1  4-----5
+
+    OpenCV's ArUco module takes these tags for upright when they stand on their head: of the four corners
+    that it lists, ours are those with the indices 1, 0, 3, 2.
+
+    The origin is point 0, x to the right, y down (so the other points have y <= 0) and z into the board.
+    Kalibr's frame has the same origin and x, but y up and z out of the board: half a turn about x leads from
+    one to the other. The tags tell the corners apart, so the board has no symmetry but the identity.
+
+    Parameters
+    ----------
+    rows, columns
+        Number of tags (Kalibr: `tagRows`, `tagCols`), each 1 to 100.
+    tag_m
+        Side of a tag in metres, over its black border (Kalibr: `tagSize`).
+    spacing_ratio
+        Space between two tags divided by the side of a tag (Kalibr: `tagSpacing`), above 0 to 10.
+    dictionary
+        OpenCV's name of the family of tags.
+    border_bits
+        Width of the black border in bits: 2 as Kalibr prints, 1 elsewhere.
+
+    Raises
+    ------
+    InputError
+        A number out of its range, a dictionary that is no AprilTag family, or more tags than it has.
+    """
+
+    family: ClassVar[str] = "aprilgrid"
+
+    rows: int
+    columns: int
+    tag_m: float
+    spacing_ratio: float
+    dictionary: str = "DICT_APRILTAG_36h11"
+    border_bits: int = 2
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rows", count(self.rows, 1, 100, "aprilgrid: rows"))
+        object.__setattr__(self, "columns", count(self.columns, 1, 100, "aprilgrid: columns"))
+        object.__setattr__(self, "tag_m", positive(self.tag_m, "aprilgrid: tag_m"))
+        object.__setattr__(self, "spacing_ratio", positive(self.spacing_ratio, "aprilgrid: spacing_ratio"))
+        object.__setattr__(self, "border_bits", count(self.border_bits, 1, 2, "aprilgrid: border_bits"))
+        if self.spacing_ratio > 10:
+            raise InputError(
+                f"aprilgrid: spacing_ratio {self.spacing_ratio:g}, expected at most 10",
+                code="out_of_range",
+                hint="it is a ratio to the side of a tag, not a length",
+            )
+        check_point_count(4 * self.rows * self.columns, "aprilgrid")
+        check_dictionary(self.dictionary, self.rows * self.columns, "aprilgrid")
+        if not self.dictionary.startswith("DICT_APRILTAG_"):
+            raise InputError(
+                f"aprilgrid: dictionary {self.dictionary}, expected a family such as DICT_APRILTAG_36h11",
+                code="unknown_dictionary",
+            )
+
+    def _layout(self) -> FloatArray:
+        row, column = np.divmod(np.arange(self.rows * self.columns), self.columns)
+        lower_left = np.column_stack([column, -row]) * (self.tag_m * (1 + self.spacing_ratio))
+        corners = np.array([[0, 0], [1, 0], [1, -1], [0, -1]]) * self.tag_m
+        return (lower_left[:, np.newaxis] + corners).reshape(-1, 2)

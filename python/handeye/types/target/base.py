@@ -1,0 +1,136 @@
+"""What every calibration target has."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import fields
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from handeye.errors import InputError
+from handeye.types.arrays import FloatArray, IndexArray
+from handeye.types.plain import read_document, without_none
+from handeye.types.target.symmetry import Turn, turns_onto_itself
+
+MAX_POINTS = 100_000
+
+
+class Target(ABC):
+    """A flat board with points at known places.
+
+    Frame: z = 0 on the board, metres, origin at point 0, x along the columns to the right and y along the
+    rows downwards as one looks at its front, so z points into the board and its front faces -z, as usual
+    with OpenCV.
+
+    A member of the family is a frozen dataclass with the measures of the board as its fields.
+    """
+
+    family: ClassVar[str]
+    """Name of the family, as in files."""
+
+    _members: ClassVar[dict[str, type["Target"]]] = {}
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:  # noqa: ANN401 - passed on as it is
+        super().__init_subclass__(**kwargs)
+        Target._members[cls.family] = cls
+
+    @abstractmethod
+    def _layout(self) -> FloatArray:
+        """Return the points (P, 2) in the plane of the board, in metres."""
+
+    def _looks_the_same(self, turn: Turn) -> bool:
+        """Tell whether the picture of the board, not only its points, is the same after a turn."""
+        return turn.quarters == 0
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """(P, 3) points in the frame of the target, metres, read-only; the row is the id of the point."""
+        layout = self._layout()
+        points = np.column_stack([layout, np.zeros(len(layout))])
+        points.flags.writeable = False
+        return points
+
+    @property
+    def point_count(self) -> int:
+        """Number of points P."""
+        return len(self.points)
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the circles in metres; 0 where the points are corners."""
+        return 0.0
+
+    @cached_property
+    def radii_m(self) -> FloatArray:
+        """(P,) radius of the circle at each point in metres, 0 for a corner; read-only."""
+        radii = self._radii()
+        radii.flags.writeable = False
+        return radii
+
+    def _radii(self) -> FloatArray:
+        """Return the radii (P,) of the circles at the points."""
+        return np.full(self.point_count, self.radius_m)
+
+    @cached_property
+    def turns(self) -> tuple[Turn, ...]:
+        """Turns about the centre that bring points onto points, however they look; identity first."""
+        return turns_onto_itself(self.points)
+
+    @cached_property
+    def symmetries(self) -> tuple[IndexArray, ...]:
+        """Permutations (P,) of the points under which the board looks the same, identity first.
+
+        A detection that says point i may as well mean point `symmetry[i]` for each of them: the picture
+        cannot tell. They form a group and stand for turns of the board about its centre.
+        """
+        return tuple(turn.permutation for turn in self.turns if self._looks_the_same(turn))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON or TOML; `Target.from_dict` reads them back."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}  # pyright: ignore[reportArgumentType]
+        return {"family": self.family, **without_none(**values)}
+
+    @staticmethod
+    def from_dict(data: object) -> "Target":
+        """Read what `to_dict` of any family wrote.
+
+        Raises
+        ------
+        InputError
+            An unknown family; a missing, unknown or unusable field.
+        """
+        table = dict(read_document(data, Mapping[str, Any], "target"))
+        family = table.pop("family", None)
+        member = Target._members.get(family) if isinstance(family, str) else None
+        if member is None:
+            raise InputError(
+                f"target: family {family!r}, expected one of {', '.join(sorted(Target._members))}",
+                code="unknown_target",
+            )
+        names = [field.name for field in fields(member)]  # pyright: ignore[reportArgumentType]
+        unknown = sorted(set(table) - set(names))
+        if unknown:
+            raise InputError(
+                f"target: {family} has no field {unknown[0]!r}, expected {', '.join(names)}",
+                code="invalid_field",
+            )
+        return read_document(table, member, f"target: {family}")
+
+
+def check_point_count(points: int, what: str) -> None:
+    """Refuse a board of more points than any camera resolves.
+
+    Raises
+    ------
+    InputError
+        More than 100 000 points.
+    """
+    if points > MAX_POINTS:
+        raise InputError(f"{what}: {points} points, expected at most {MAX_POINTS}", code="out_of_range")
+
+
+def grid(rows: int, columns: int, pitch_m: float) -> FloatArray:
+    """Return a lattice (rows * columns, 2) of points, row by row, x fastest."""
+    y, x = np.divmod(np.arange(rows * columns), columns)
+    return np.column_stack([x, y]) * pitch_m
