@@ -5,6 +5,8 @@
 //! division before it and the focal lengths and principal point after it.
 
 mod brown_conrady;
+mod circle;
+mod feature;
 mod kannala_brandt;
 mod pinhole;
 mod region;
@@ -12,6 +14,8 @@ mod region;
 use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
 
 use crate::error::Error;
+
+pub use feature::{Feature, Observation};
 
 /// Most parameters a lens can have (Brown-Conrady with 12 coefficients).
 pub const MAX_PARAMETERS: usize = 16;

@@ -1,0 +1,189 @@
+//! What a target shows of itself: points, and circles seen as the area centroid of their image.
+//!
+//! A detector that takes the centre of gravity of a blob measures the centroid of the projected disc, which is not
+//! the projection of the disc's centre: with focal length f, radius r, depth Z and tilt a the two differ by about
+//! `f r^2 sin(2 a) / (2 Z^2)` pixels. What is predicted here is the centroid.
+
+use std::array::from_fn;
+
+use nalgebra::{Matrix2, Matrix2x6, SMatrix, Vector2, Vector3};
+
+use super::circle::{BOUNDARY, Boundary, CIRCLE, Ellipse};
+use super::{Camera, Lens, ParameterJacobian};
+use crate::error::Error;
+use crate::se3::Se3;
+
+/// A feature of a planar target, in the target's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Feature {
+    /// The point, or the centre of the circle; metres.
+    pub position: Vector3<f64>,
+    /// Radius of the circle, whose normal is the z axis of the target; metres; 0 for a point.
+    pub radius: f64,
+}
+
+impl Feature {
+    /// A feature, validated.
+    ///
+    /// # Errors
+    /// [`Error::InvalidInput`] for a position that is not finite or a radius that is negative or not finite.
+    pub fn new(position: Vector3<f64>, radius: f64) -> Result<Self, Error> {
+        if !position.iter().all(|x| x.is_finite()) {
+            return Err(Error::invalid("the position of a feature is not finite"));
+        }
+        if !(radius.is_finite() && radius >= 0.0) {
+            return Err(Error::invalid(format!("the radius of a feature must be 0 or positive metres, found {radius}")));
+        }
+        Ok(Self { position, radius })
+    }
+
+    /// The feature of a target printed `scale` times as large.
+    #[inline]
+    pub(crate) fn scaled(&self, scale: f64) -> Self {
+        Self { position: self.position * scale, radius: self.radius * scale }
+    }
+}
+
+/// What a camera sees of a feature, with derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation {
+    /// The pixel.
+    pub pixel: Vector2<f64>,
+    /// Derivative in the left perturbation `[rho; phi]` of `T_camera_target`.
+    pub d_twist: Matrix2x6<f64>,
+    /// Derivative in the camera parameters.
+    pub d_parameters: ParameterJacobian,
+}
+
+impl Camera {
+    /// Pixel at which a feature is detected: of a point its projection, of a circle the centroid of its image.
+    /// None where the lens does not see all of it.
+    #[inline]
+    pub fn observe(&self, t_camera_target: &Se3, feature: &Feature) -> Option<Vector2<f64>> {
+        if feature.radius == 0.0 {
+            return self.project(&t_camera_target.act(&feature.position));
+        }
+        self.observe_circle(t_camera_target, feature)
+    }
+
+    /// [`Camera::observe`] with the derivative in the left perturbation of `T_camera_target`.
+    #[inline]
+    pub fn observe_with_twist_derivative(
+        &self,
+        t_camera_target: &Se3,
+        feature: &Feature,
+    ) -> Option<(Vector2<f64>, Matrix2x6<f64>)> {
+        if feature.radius == 0.0 {
+            let point = t_camera_target.act(&feature.position);
+            let (pixel, d_point) = self.project_with_point_derivative(&point)?;
+            return Some((pixel, point_to_twist(&point, &d_point)));
+        }
+        let observation = self.observe_circle_with_derivatives::<false>(t_camera_target, feature)?;
+        Some((observation.pixel, observation.d_twist))
+    }
+
+    /// [`Camera::observe`] with all derivatives.
+    #[inline]
+    pub fn observe_with_derivatives(&self, t_camera_target: &Se3, feature: &Feature) -> Option<Observation> {
+        if feature.radius == 0.0 {
+            let point = t_camera_target.act(&feature.position);
+            let projection = self.project_with_derivatives(&point)?;
+            return Some(Observation {
+                pixel: projection.pixel,
+                d_twist: point_to_twist(&point, &projection.d_point),
+                d_parameters: projection.d_parameters,
+            });
+        }
+        self.observe_circle_with_derivatives::<true>(t_camera_target, feature)
+    }
+
+    fn observe_circle(&self, t_camera_target: &Se3, feature: &Feature) -> Option<Vector2<f64>> {
+        let ellipse = Ellipse::of(t_camera_target, feature)?;
+        let [x, y] = ellipse.centre;
+        let middle = self.bend(x, y)?;
+        if self.lens == Lens::Pinhole {
+            return Some(self.to_pixel(x, y));
+        }
+        let mut boundary = Boundary::default();
+        for (i, at) in ellipse.boundary().enumerate() {
+            let bent = self.bend(at[0], at[1])?;
+            boundary.x[i] = bent.x - middle.x;
+            boundary.y[i] = bent.y - middle.y;
+        }
+        let (centroid, _) = boundary.centroid();
+        Some(self.to_pixel(middle.x + centroid.x, middle.y + centroid.y))
+    }
+
+    fn observe_circle_with_derivatives<const PARAMETERS: bool>(
+        &self,
+        t_camera_target: &Se3,
+        feature: &Feature,
+    ) -> Option<Observation> {
+        let ellipse = Ellipse::of(t_camera_target, feature)?;
+        let d_ellipse = ellipse.d_twist();
+        let [x, y] = ellipse.centre;
+        let middle = self.bend(x, y)?;
+        let mut d_parameters = ParameterJacobian::zeros();
+        let mut d_shape = SMatrix::<f64, 2, 5>::zeros();
+        let mut centroid = Vector2::new(middle.x, middle.y);
+        if self.lens == Lens::Pinhole {
+            d_shape.fixed_view_mut::<2, 2>(0, 0).fill_with_identity();
+        } else {
+            let at: [[f64; 2]; BOUNDARY] = {
+                let mut points = ellipse.boundary();
+                from_fn(|_| points.next().expect("as many as there are"))
+            };
+            let mut boundary = Boundary::default();
+            let mut lens = [Matrix2::zeros(); BOUNDARY];
+            for i in 0..BOUNDARY {
+                let bent = self.bend(at[i][0], at[i][1])?;
+                boundary.x[i] = bent.x - middle.x;
+                boundary.y[i] = bent.y - middle.y;
+                lens[i] = bent.jacobian;
+            }
+            let (offset, weights) = boundary.centroid();
+            centroid += offset;
+            let mut d_bent = ParameterJacobian::zeros();
+            for i in 0..BOUNDARY {
+                let d_at = weights[i] * lens[i];
+                let (cos, sin) = CIRCLE[i];
+                let (along_x, along_y) = (d_at.column(0), d_at.column(1));
+                d_shape.column_mut(0).axpy(1.0, &along_x, 1.0);
+                d_shape.column_mut(1).axpy(1.0, &along_y, 1.0);
+                d_shape.column_mut(2).axpy(cos, &along_x, 1.0);
+                d_shape.column_mut(3).axpy(cos, &along_y, 1.0);
+                d_shape.column_mut(4).axpy(sin, &along_y, 1.0);
+                if PARAMETERS {
+                    self.bend_coefficients(at[i][0], at[i][1], &mut d_bent);
+                    d_parameters += weights[i] * d_bent;
+                }
+            }
+        }
+        if PARAMETERS {
+            self.finish_parameters(centroid.x, centroid.y, &mut d_parameters);
+        }
+        let mut d_twist = d_shape * d_ellipse;
+        d_twist.row_mut(0).scale_mut(self.parameters[0]);
+        d_twist.row_mut(1).scale_mut(self.parameters[1]);
+        Some(Observation { pixel: self.to_pixel(centroid.x, centroid.y), d_twist, d_parameters })
+    }
+}
+
+/// The derivative in the twist out of that in a point: `dP = rho + phi x P`.
+#[inline]
+fn point_to_twist(point: &Vector3<f64>, d_point: &SMatrix<f64, 2, 3>) -> Matrix2x6<f64> {
+    let mut d_twist = Matrix2x6::zeros();
+    for i in 0..2 {
+        let (a, b, c) = (d_point[(i, 0)], d_point[(i, 1)], d_point[(i, 2)]);
+        d_twist[(i, 0)] = a;
+        d_twist[(i, 1)] = b;
+        d_twist[(i, 2)] = c;
+        d_twist[(i, 3)] = point.y * c - point.z * b;
+        d_twist[(i, 4)] = point.z * a - point.x * c;
+        d_twist[(i, 5)] = point.x * b - point.y * a;
+    }
+    d_twist
+}
+
+#[cfg(test)]
+mod tests;
