@@ -6,5 +6,7 @@
 pub mod camera;
 pub mod closed_form;
 pub mod error;
+pub mod information;
+pub mod least_squares;
 pub mod se3;
 pub mod testing;

@@ -24,11 +24,18 @@ fn check_shape(py: Python<'_>, name: &str, array: &Array<'_>, pattern: &[Option<
     let expected: Vec<String> =
         pattern.iter().map(|p| p.map_or_else(|| "N".to_owned(), |p| p.to_string())).collect();
     let found: Vec<String> = shape.iter().map(ToString::to_string).collect();
-    Err(invalid(py, &format!("{name} must have shape ({}), found ({})", expected.join(", "), found.join(", "))))
+    Err(invalid(
+        py,
+        &format!("{name} must have shape ({}), found ({})", expected.join(", "), found.join(", ")),
+    ))
 }
 
 /// Rows of an `(N, D)` array.
-pub fn vectors<const D: usize>(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Vec<SVector<f64, D>>> {
+pub fn vectors<const D: usize>(
+    py: Python<'_>,
+    name: &str,
+    array: &Array<'_>,
+) -> PyResult<Vec<SVector<f64, D>>> {
     check_shape(py, name, array, &[None, Some(D)])?;
     let view = array.as_array();
     Ok(view.axis_iter(Axis(0)).map(|row| SVector::from_iterator(row.iter().copied())).collect())
@@ -129,4 +136,28 @@ pub fn matrices_columns_out<'py, const R: usize, const C: usize>(
 pub fn transforms_out<'py>(py: Python<'py>, transforms: &[Se3]) -> Bound<'py, PyArrayDyn<f64>> {
     let matrices: Vec<Matrix4<f64>> = transforms.iter().map(Se3::to_matrix).collect();
     matrices_out(py, &matrices)
+}
+
+/// An `(N,)` array.
+pub fn scalars_out(py: Python<'_>, values: Vec<f64>) -> Bound<'_, PyArrayDyn<f64>> {
+    array(py, &[values.len()], values)
+}
+
+/// An `(R, C)` array of a matrix of any size.
+pub fn dynamic_out<'py>(py: Python<'py>, m: &nalgebra::DMatrix<f64>) -> Bound<'py, PyArrayDyn<f64>> {
+    array(py, &[m.nrows(), m.ncols()], m.transpose().as_slice().to_vec())
+}
+
+/// An `(N, R, C)` array of matrices of one size.
+pub fn dynamics_out<'py>(
+    py: Python<'py>,
+    all: &[nalgebra::DMatrix<f64>],
+    rows: usize,
+    columns: usize,
+) -> Bound<'py, PyArrayDyn<f64>> {
+    array(
+        py,
+        &[all.len(), rows, columns],
+        all.iter().flat_map(|m| m.transpose().as_slice().to_vec()).collect(),
+    )
 }

@@ -8,10 +8,16 @@ mod camera;
 mod convert;
 mod errors;
 mod geometry;
+mod information;
+mod model;
+mod problem;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     camera::register(module)?;
     geometry::register(module)?;
+    problem::register(module)?;
+    model::register(module)?;
+    information::register(module)?;
     Ok(())
 }

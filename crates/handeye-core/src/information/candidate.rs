@@ -1,0 +1,218 @@
+//! What a view not yet taken would tell: its predicted information, seen through the noise of the robot.
+
+use nalgebra::{DMatrix, Matrix6, Vector2};
+
+use super::belief::{Belief, CHAIN};
+use super::criteria::Criterion;
+use crate::camera::{Camera, Feature};
+use crate::error::Error;
+use crate::least_squares::{Model, Moments, PixelColumns, PixelParameters, Side, ViewBlock, marginalised};
+use crate::se3::Se3;
+
+/// Which features a candidate is expected to see.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sight {
+    /// Image width and height, px; `None`: whatever the lens can project counts.
+    pub image: Option<[f64; 2]>,
+    /// Distance that a feature must keep from the image border, px.
+    pub margin_px: f64,
+    /// Fewest features in sight; a candidate with fewer has no gain.
+    pub fewest: usize,
+}
+
+/// What predicts a candidate: the current estimate and the noise its view would have.
+#[derive(Clone, Debug)]
+pub struct CandidateModel<'a> {
+    /// Current camera.
+    pub camera: &'a Camera,
+    /// Current `X`.
+    pub x: Se3,
+    /// Current `Y`.
+    pub y: Se3,
+    /// Features of the target.
+    pub features: &'a [Feature],
+    /// Expected pixel noise, px.
+    pub pixel_sigma: f64,
+    /// Side and square root of the covariance of the robot's error.
+    pub robot: Option<(Side, Matrix6<f64>)>,
+    /// Which pixel parameters are free.
+    pub pixel_parameters: Option<&'a PixelParameters>,
+    /// Number of kinematic parameters (their Jacobian comes with each candidate).
+    pub kinematic_count: usize,
+    /// What must be seen.
+    pub sight: Sight,
+}
+
+/// A candidate's information `F F'` in all global parameters.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// `F`, `n x (6 + n_c)`.
+    pub factor: DMatrix<f64>,
+    /// Features in sight.
+    pub seen: usize,
+}
+
+impl CandidateModel<'_> {
+    /// Number of global parameters of the belief it goes with.
+    pub fn parameter_count(&self) -> usize {
+        CHAIN + self.pixel_parameters.map_or(0, PixelParameters::count) + self.kinematic_count
+    }
+
+    /// The quadratic at the predicted pose, robot error marginalised; `None` if too little is in sight.
+    fn block(&self, motion: &Se3) -> Option<(ViewBlock, usize)> {
+        let pose = self.x * *motion * self.y;
+        let information = 1.0 / (self.pixel_sigma * self.pixel_sigma);
+        let nothing = Vector2::zeros();
+        let mut moments = Moments::new();
+        let mut columns = self.pixel_parameters.map(|p| (p, PixelColumns::zeros(p.count())));
+        let mut seen = 0;
+        for feature in self.features {
+            if let Some((parameters, columns)) = &mut columns {
+                let Some(o) = self.camera.observe_with_derivatives(&pose, feature) else { continue };
+                if !self.in_image(&o.pixel) {
+                    continue;
+                }
+                moments.add(&o.d_twist, None, &nothing, information);
+                columns.add(parameters, &o, &(pose.rotation * feature.position), &nothing, information, None);
+            } else {
+                let Some((pixel, d)) = self.camera.observe_with_twist_derivative(&pose, feature) else {
+                    continue;
+                };
+                if !self.in_image(&pixel) {
+                    continue;
+                }
+                moments.add(&d, None, &nothing, information);
+            }
+            seen += 1;
+        }
+        if seen < self.sight.fewest.max(1) {
+            return None;
+        }
+        let (m, g) = moments.finish();
+        let block = ViewBlock { m, g, columns: columns.map(|c| c.1), cost: 0.0, squared_px: 0.0 };
+        let Some((side, root)) = &self.robot else { return Some((block, seen)) };
+        let before = match side {
+            Side::Left => self.x,
+            Side::Right => self.x * *motion,
+        };
+        Some((marginalised(&block, &(before.adjoint() * root)), seen))
+    }
+
+    #[inline]
+    fn in_image(&self, pixel: &Vector2<f64>) -> bool {
+        let margin = self.sight.margin_px;
+        match self.sight.image {
+            None => true,
+            Some([width, height]) => {
+                pixel.x >= margin
+                    && pixel.y >= margin
+                    && pixel.x <= width - 1.0 - margin
+                    && pixel.y <= height - 1.0 - margin
+            }
+        }
+    }
+
+    /// The candidate at robot motion `A`, with the kinematic Jacobian `D` if the model has kinematic parameters.
+    pub fn candidate(&self, motion: &Se3, kinematic: Option<&DMatrix<f64>>) -> Option<Candidate> {
+        let (block, seen) = self.block(motion)?;
+        let extra = block.columns.as_ref().map_or(0, |c| c.gc.len());
+        let n = self.parameter_count();
+        let mut map = DMatrix::zeros(6 + extra, n);
+        map.view_mut((0, 0), (6, 6)).fill_with_identity();
+        map.view_mut((0, 6), (6, 6)).copy_from(&(self.x * *motion).adjoint());
+        map.view_mut((6, CHAIN), (extra, extra)).fill_with_identity();
+        if let Some(jacobian) = kinematic {
+            map.view_mut((0, CHAIN + extra), jacobian.shape()).copy_from(&(self.x.adjoint() * jacobian));
+        }
+        let factor = map.tr_mul(&semidefinite_root(block.matrix()));
+        Some(Candidate { factor, seen })
+    }
+
+    /// Gains of candidates at the motions; NaN where too little would be in sight.
+    ///
+    /// # Errors
+    /// [`Error::InvalidInput`] if the belief has other parameters than this model.
+    pub fn gains(
+        &self,
+        belief: &Belief,
+        criterion: &dyn Criterion,
+        motions: &[Se3],
+    ) -> Result<Vec<f64>, Error> {
+        if belief.len() != self.parameter_count() {
+            return Err(Error::invalid(format!(
+                "the belief has {} parameters, the candidates {}",
+                belief.len(),
+                self.parameter_count()
+            )));
+        }
+        let plain_entropy = criterion.is_plain_entropy() && belief.len() == CHAIN;
+        let prepared = criterion.prepare(belief)?;
+        Ok(motions
+            .iter()
+            .map(|motion| {
+                if plain_entropy {
+                    self.block(motion).map(|(block, _)| self.entropy_gain(belief, &block.m, motion))
+                } else {
+                    self.candidate(motion, None).map(|c| prepared.gain(&c.factor))
+                }
+                .unwrap_or(f64::NAN)
+            })
+            .collect())
+    }
+
+    /// `1/2 ln |I + L' S L|` with `S = B Lambda^-1 B'`, by blocks of six.
+    fn entropy_gain(&self, belief: &Belief, m: &Matrix6<f64>, motion: &Se3) -> f64 {
+        let to_y = (self.x * *motion).adjoint();
+        let covariance = belief.covariance();
+        let xx = covariance.fixed_view::<6, 6>(0, 0);
+        let xy = covariance.fixed_view::<6, 6>(0, 6);
+        let yy = covariance.fixed_view::<6, 6>(6, 6);
+        let cross = xy * to_y.transpose();
+        let s = xx + cross + cross.transpose() + to_y * yy * to_y.transpose();
+        let root = semidefinite_root6(m);
+        let inner = Matrix6::identity() + root.transpose() * s * root;
+        inner.cholesky().map_or(f64::NAN, |c| (0..6).map(|i| c.l_dirty()[(i, i)].ln()).sum())
+    }
+}
+
+/// What a solve's model says of candidates.
+impl Model {
+    /// Mean pixel noise of the views (root mean square).
+    pub fn mean_pixel_sigma(&self) -> f64 {
+        let sum: f64 = self.pixel_sigma.iter().map(|s| s * s).sum();
+        (sum / self.pixel_sigma.len() as f64).sqrt()
+    }
+}
+
+/// `L` with `L L' = m` for a positive semi-definite `m`: Cholesky that leaves null columns zero.
+pub(crate) fn semidefinite_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
+    let n = m.nrows();
+    let floor: Vec<f64> = (0..n).map(|i| 1e-13 * m[(i, i)].abs()).collect();
+    for j in 0..n {
+        let pivot = m[(j, j)];
+        let inverse = if pivot > floor[j] && pivot > 0.0 { 1.0 / pivot.sqrt() } else { 0.0 };
+        for i in j..n {
+            m[(i, j)] *= inverse;
+        }
+        for k in j + 1..n {
+            let f = m[(k, j)];
+            for i in k..n {
+                m[(i, k)] -= m[(i, j)] * f;
+            }
+        }
+        for i in 0..j {
+            m[(i, j)] = 0.0;
+        }
+    }
+    m
+}
+
+fn semidefinite_root6(m: &Matrix6<f64>) -> Matrix6<f64> {
+    match m.cholesky() {
+        Some(factor) => factor.l(),
+        None => {
+            let root = semidefinite_root(DMatrix::from_column_slice(6, 6, m.as_slice()));
+            Matrix6::from_column_slice(root.as_slice())
+        }
+    }
+}

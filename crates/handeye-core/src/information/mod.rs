@@ -1,0 +1,11 @@
+//! Fisher information, entropy, and what a candidate view would add.
+//!
+//! A candidate's information has rank `6 + n_c` and is kept as a factor `F` with `I = F F'`, so that gains are
+//! small determinants: `1/2 ln |Lambda + F F'| - 1/2 ln |Lambda| = 1/2 ln |I + F' Lambda^-1 F|`.
+
+mod belief;
+mod candidate;
+pub mod criteria;
+
+pub use belief::{Belief, entropy};
+pub use candidate::{Candidate, CandidateModel, Sight};

@@ -1,0 +1,126 @@
+//! What was measured: robot motions, features and the pixels they were seen at.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::camera::{Camera, Feature};
+use crate::error::Error;
+use crate::se3::Se3;
+
+/// Fewest views that can determine `X` and `Y`: two relative motions with distinct rotation axes.
+pub const MIN_VIEWS: usize = 3;
+
+/// The measurements of a calibration; a value that exists is consistent.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    camera: Camera,
+    features: Vec<Feature>,
+    pixels: Vec<Vector2<f64>>,
+    /// Square roots of the information of each pixel relative to the view's noise; `None`: identity.
+    whitening: Option<Vec<Matrix2<f64>>>,
+    offsets: Vec<usize>,
+    motions: Vec<Se3>,
+}
+
+impl Problem {
+    /// Views `k = 0..K` hold the samples `offsets[k]..offsets[k + 1]`; `motions[k]` is `A_k` of the chain.
+    ///
+    /// `covariances` are the per-point pixel covariances of the paper's eq. 5, relative to the noise level of
+    /// the view (identity if absent).
+    ///
+    /// # Errors
+    /// [`Error::InvalidInput`] if lengths disagree, a pixel is not finite, a view has fewer than three
+    /// samples, or a covariance is not positive definite.
+    pub fn new(
+        camera: Camera,
+        features: Vec<Feature>,
+        pixels: Vec<Vector2<f64>>,
+        covariances: Option<&[Matrix2<f64>]>,
+        offsets: Vec<usize>,
+        motions: Vec<Se3>,
+    ) -> Result<Self, Error> {
+        if features.len() != pixels.len() {
+            return Err(Error::invalid(format!("{} features but {} pixels", features.len(), pixels.len())));
+        }
+        if offsets.len() != motions.len() + 1 || offsets[0] != 0 || offsets[motions.len()] != pixels.len() {
+            return Err(Error::invalid(format!(
+                "{} robot poses and {} view boundaries do not share {} samples out",
+                motions.len(),
+                offsets.len(),
+                pixels.len()
+            )));
+        }
+        for (k, pair) in offsets.windows(2).enumerate() {
+            if pair[1] < pair[0] + 3 {
+                return Err(Error::invalid(format!("view {k} has fewer than 3 points")));
+            }
+            for (i, pixel) in pixels[pair[0]..pair[1]].iter().enumerate() {
+                if !(pixel.x.is_finite() && pixel.y.is_finite()) {
+                    return Err(Error::invalid(format!("view {k}, point {i}: the pixel is not finite")));
+                }
+            }
+        }
+        let whitening = covariances.map(|all| whitening(all, pixels.len())).transpose()?;
+        Ok(Self { camera, features, pixels, whitening, offsets, motions })
+    }
+
+    /// The camera the pixels were taken with.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Number of views.
+    pub fn view_count(&self) -> usize {
+        self.motions.len()
+    }
+
+    /// `A_k`.
+    pub fn motion(&self, k: usize) -> &Se3 {
+        &self.motions[k]
+    }
+
+    /// Samples of view `k`.
+    pub fn samples(&self, k: usize) -> Range<usize> {
+        self.offsets[k]..self.offsets[k + 1]
+    }
+
+    /// Number of points in view `k`.
+    pub fn point_count(&self, k: usize) -> usize {
+        self.offsets[k + 1] - self.offsets[k]
+    }
+
+    /// Features, one per sample.
+    pub fn features(&self) -> &[Feature] {
+        &self.features
+    }
+
+    /// Pixels, one per sample.
+    pub fn pixels(&self) -> &[Vector2<f64>] {
+        &self.pixels
+    }
+
+    /// Square root of the relative information of sample `i`.
+    pub fn whitening(&self, i: usize) -> Option<&Matrix2<f64>> {
+        self.whitening.as_ref().map(|w| &w[i])
+    }
+}
+
+fn whitening(covariances: &[Matrix2<f64>], samples: usize) -> Result<Vec<Matrix2<f64>>, Error> {
+    if covariances.len() != samples {
+        return Err(Error::invalid(format!("{} point covariances but {samples} points", covariances.len())));
+    }
+    covariances
+        .iter()
+        .enumerate()
+        .map(|(i, covariance)| {
+            let lower = covariance
+                .cholesky()
+                .ok_or_else(|| Error::invalid(format!("covariance of point {i} is not positive definite")))?
+                .l();
+            lower
+                .try_inverse()
+                .ok_or_else(|| Error::invalid(format!("covariance of point {i} is not positive definite")))
+        })
+        .collect()
+}

@@ -1,0 +1,243 @@
+//! Entropy, gains and predicted information of candidates.
+
+use handeye_core::information::criteria::{
+    Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, ToolPoint, Trace,
+};
+use handeye_core::information::{Belief as CoreBelief, CandidateModel, Sight};
+use handeye_core::least_squares::PixelParameters;
+use nalgebra::DMatrix;
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+
+use crate::convert::{self, Array};
+use crate::errors::{invalid, to_python};
+use crate::model::{side, square};
+use crate::problem::{camera, features};
+
+/// Registers the classes of this file.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Belief>()?;
+    module.add_class::<PyCriterion>()?;
+    module.add_class::<Predictor>()
+}
+
+/// Information of all global parameters and what follows from it.
+#[pyclass(frozen, module = "handeye._core")]
+pub struct Belief {
+    inner: CoreBelief,
+}
+
+#[pymethods]
+impl Belief {
+    #[new]
+    fn new(py: Python<'_>, information: Array<'_>) -> PyResult<Self> {
+        let information = square(py, "information", &information)?;
+        CoreBelief::new(information).map(|inner| Self { inner }).map_err(|e| to_python(py, e))
+    }
+
+    /// Inverse of the information.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f64>> {
+        convert::dynamic_out(py, self.inner.covariance())
+    }
+
+    /// `ln |Lambda|`.
+    #[getter]
+    fn log_determinant(&self) -> f64 {
+        self.inner.log_determinant()
+    }
+
+    /// Entropy of all parameters, nats.
+    #[getter]
+    fn entropy(&self) -> f64 {
+        self.inner.entropy()
+    }
+
+    /// Entropy of the hand-eye alone, nats.
+    #[getter]
+    fn hand_eye_entropy(&self) -> f64 {
+        self.inner.hand_eye_entropy()
+    }
+}
+
+/// What a view is worth.
+#[pyclass(frozen, name = "Criterion", module = "handeye._core")]
+pub struct PyCriterion {
+    inner: Box<dyn Criterion + Send + Sync>,
+}
+
+#[pymethods]
+impl PyCriterion {
+    #[new]
+    #[pyo3(signature = (name, *, length_scale_m=1e-3, angle_scale_rad=1e-3, tool_points=None, over="mean"))]
+    fn new(
+        py: Python<'_>,
+        name: &str,
+        length_scale_m: f64,
+        angle_scale_rad: f64,
+        tool_points: Option<Array<'_>>,
+        over: &str,
+    ) -> PyResult<Self> {
+        let scales = Scales { length_m: length_scale_m, angle_rad: angle_scale_rad };
+        if !(length_scale_m > 0.0 && angle_scale_rad > 0.0) {
+            return Err(invalid(py, "length and angle scales must be positive"));
+        }
+        let inner: Box<dyn Criterion + Send + Sync> = match name {
+            "entropy" => Box::new(Entropy),
+            "entropy_handeye" => Box::new(EntropyHandEye),
+            "trace" => Box::new(Trace { scales }),
+            "eigenvalue_sum" => Box::new(EigenvalueSum { scales }),
+            "min_eigenvalue" => Box::new(MinEigenvalue { scales }),
+            "tool_point" => {
+                let points =
+                    tool_points.ok_or_else(|| invalid(py, "criterion tool_point needs tool_points"))?;
+                let points = convert::vectors::<3>(py, "tool_points", &points)?;
+                let over = match over {
+                    "mean" => Over::Mean,
+                    "worst" => Over::Worst,
+                    other => {
+                        return Err(invalid(py, &format!("over must be mean or worst, found \"{other}\"")));
+                    }
+                };
+                Box::new(ToolPoint::new(&points, over).map_err(|e| to_python(py, e))?)
+            }
+            other => {
+                return Err(invalid(
+                    py,
+                    &format!(
+                        "unknown criterion \"{other}\"; there are entropy, entropy_handeye, trace, \
+                         eigenvalue_sum, min_eigenvalue, tool_point"
+                    ),
+                ));
+            }
+        };
+        Ok(Self { inner })
+    }
+
+    /// Stable name.
+    #[getter]
+    fn name(&self) -> &'static str {
+        self.inner.name()
+    }
+}
+
+/// Predicts what candidate views would tell.
+#[pyclass(frozen, module = "handeye._core")]
+pub struct Predictor {
+    camera: handeye_core::camera::Camera,
+    x: handeye_core::se3::Se3,
+    y: handeye_core::se3::Se3,
+    features: Vec<handeye_core::camera::Feature>,
+    pixel_sigma: f64,
+    robot: Option<(handeye_core::least_squares::Side, nalgebra::Matrix6<f64>)>,
+    pixel_parameters: Option<PixelParameters>,
+    sight: Sight,
+}
+
+impl Predictor {
+    fn model(&self) -> CandidateModel<'_> {
+        CandidateModel {
+            camera: &self.camera,
+            x: self.x,
+            y: self.y,
+            features: &self.features,
+            pixel_sigma: self.pixel_sigma,
+            robot: self.robot,
+            pixel_parameters: self.pixel_parameters.as_ref(),
+            kinematic_count: 0,
+            sight: self.sight,
+        }
+    }
+}
+
+#[pymethods]
+impl Predictor {
+    #[new]
+    #[pyo3(signature = (
+        lens, parameters, points, radii, x, y, *, pixel_sigma, robot_side=None, robot_root=None,
+        free_camera=None, board_scale=false, image_size=None, margin_px=0.0, fewest=3,
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "one keyword per assumption")]
+    fn new<'py>(
+        py: Python<'py>,
+        lens: &str,
+        parameters: Array<'py>,
+        points: Array<'py>,
+        radii: Array<'py>,
+        x: Array<'py>,
+        y: Array<'py>,
+        pixel_sigma: f64,
+        robot_side: Option<&str>,
+        robot_root: Option<Array<'py>>,
+        free_camera: Option<Vec<usize>>,
+        board_scale: bool,
+        image_size: Option<(f64, f64)>,
+        margin_px: f64,
+        fewest: usize,
+    ) -> PyResult<Self> {
+        if !(pixel_sigma > 0.0 && pixel_sigma.is_finite()) {
+            return Err(invalid(py, "pixel_sigma must be positive"));
+        }
+        let robot = match (robot_side, robot_root) {
+            (None, None) => None,
+            (Some(name), Some(root)) => {
+                Some((side(py, name)?, convert::matrix::<6, 6>(py, "robot_root", &root)?))
+            }
+            _ => return Err(invalid(py, "robot_side and robot_root go together")),
+        };
+        let free = free_camera.unwrap_or_default();
+        let count = free.len() + usize::from(board_scale);
+        let pixel_parameters = (count > 0).then(|| PixelParameters {
+            camera: free,
+            board_scale,
+            prior_information: DMatrix::zeros(count, count),
+        });
+        Ok(Self {
+            camera: camera(py, lens, &parameters)?,
+            x: convert::transform(py, "x", &x)?,
+            y: convert::transform(py, "y", &y)?,
+            features: features(py, &points, &radii)?,
+            pixel_sigma,
+            robot,
+            pixel_parameters,
+            sight: Sight { image: image_size.map(|(w, h)| [w, h]), margin_px, fewest },
+        })
+    }
+
+    /// Gain of each candidate motion; NaN where too little would be in sight.
+    fn gains<'py>(
+        &self,
+        py: Python<'py>,
+        belief: &Belief,
+        criterion: &PyCriterion,
+        motions: Array<'py>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let motions = convert::transforms(py, "motions", &motions)?;
+        let gains = py
+            .detach(|| self.model().gains(&belief.inner, criterion.inner.as_ref(), &motions))
+            .map_err(|e| to_python(py, e))?;
+        Ok(convert::scalars_out(py, gains))
+    }
+
+    /// Information `(N, n, n)` of each candidate motion; zero where too little would be in sight.
+    fn informations<'py>(
+        &self,
+        py: Python<'py>,
+        motions: Array<'py>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let motions = convert::transforms(py, "motions", &motions)?;
+        let model = self.model();
+        let n = model.parameter_count();
+        let all: Vec<DMatrix<f64>> = py.detach(|| {
+            motions
+                .iter()
+                .map(|motion| {
+                    model
+                        .candidate(motion, None)
+                        .map_or_else(|| DMatrix::zeros(n, n), |c| &c.factor * c.factor.transpose())
+                })
+                .collect()
+        });
+        Ok(convert::dynamics_out(py, &all, n, n))
+    }
+}
