@@ -1,4 +1,4 @@
-"""Resolve requirements/dev.txt and requirements/run.txt from pyproject.toml, with hashes and without addresses.
+"""Resolve requirements/dev.txt and run.txt from pyproject.toml, with hashes and without addresses.
 
 Run by `make lock`. The resolver lives in a throw-away environment, so nobody needs it for anything else.
 """
