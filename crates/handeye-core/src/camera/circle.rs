@@ -8,22 +8,23 @@
 
 use std::array::from_fn;
 
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, SVector, Vector2, Vector3};
 
 use super::MIN_DEPTH_M;
 use super::feature::Feature;
 use crate::se3::Se3;
 
 /// Number of points on the boundary of a circle's image.
-pub(super) const BOUNDARY: usize = 8;
+pub(super) const BOUNDARY: usize = 6;
 
 /// A disc whose plane passes the camera at less than this sine of the angle of sight counts as not seen.
 const MIN_GRAZING_SINE: f64 = 1e-6;
 
 /// Cosine and sine of the directions to the boundary points.
 pub(super) const CIRCLE: [(f64, f64); BOUNDARY] = {
-    const H: f64 = std::f64::consts::FRAC_1_SQRT_2;
-    [(1.0, 0.0), (H, H), (0.0, 1.0), (-H, H), (-1.0, 0.0), (-H, -H), (0.0, -1.0), (H, -H)]
+    // sin(pi / 3)
+    const H: f64 = 0.866_025_403_784_438_6;
+    [(1.0, 0.0), (0.5, H), (-0.5, H), (-1.0, 0.0), (-0.5, -H), (0.5, -H)]
 };
 
 /// The image of a circle in the plane at unit depth: `centre + root (cos t, sin t)`.
@@ -63,10 +64,7 @@ impl Ellipse {
         }
         let rr = radius * radius;
         let denominator = c.z * c.z - rr * tilt_squared;
-        let centre = [
-            (c.z * c.x + rr * n.z * n.x) / denominator,
-            (c.z * c.y + rr * n.z * n.y) / denominator,
-        ];
+        let centre = [(c.z * c.x + rr * n.z * n.x) / denominator, (c.z * c.y + rr * n.z * n.y) / denominator];
         let zz = c.z * c.z;
         let zn = c.z * n.z;
         let w11 = zz * (1.0 - n.x * n.x) + tilt_squared * c.x * c.x + 2.0 * zn * c.x * n.x - rr * n.y * n.y;
@@ -87,70 +85,59 @@ impl Ellipse {
     }
 
     #[inline]
-    pub fn boundary(&self) -> impl Iterator<Item = [f64; 2]> {
+    pub fn boundary(&self) -> [[f64; 2]; BOUNDARY] {
         let [cx, cy] = self.centre;
         let [a, b, c] = self.triangle.map(|l| l * self.scale);
-        CIRCLE.iter().map(move |(cos, sin)| [cx + a * cos, cy + b * cos + c * sin])
+        CIRCLE.map(|(cos, sin)| [cx + a * cos, cy + b * cos + c * sin])
     }
 
-    /// Derivative of centre and root `(c_x, c_y, l11, l21, l22)` in the twist.
+    /// The gradient in the twist of a scalar with gradient `d` in centre and root `(c_x, c_y, l11, l21, l22)`.
     ///
-    /// A scalar with gradients `g` in the circle's position C and `h` in its normal n has the gradient
-    /// `[g; C x g + n x h]` in the twist.
+    /// Reverse accumulation: back to the gradients `g` in the circle's position C and `h` in its normal n, which
+    /// make `[g; C x g + n x h]` in the twist.
     #[inline]
-    pub fn d_twist(&self) -> SMatrix<f64, 5, 6> {
+    pub fn pull_back(&self, d: &[f64; 5]) -> SVector<f64, 6> {
         let (c, n, rr) = (&self.position, &self.normal, self.squared_radius);
+        let [l11, l21, l22] = self.triangle;
+        let [d_l11, d_l21, d_l22] = [d[2], d[3], d[4]].map(|d| d * self.scale);
+        // The denominator divides everything, and its root is a factor of l22; the rest of l22 is n . C / l11.
+        let d_denominator = (0.5 * d_l22 * l22
+            - d[0] * self.centre[0]
+            - d[1] * self.centre[1]
+            - d_l11 * l11
+            - d_l21 * l21
+            - d_l22 * l22)
+            / self.denominator;
+        let d_distance = d_l22 * l22 / self.distance;
+        let d_w12 = d_l21 / l11;
+        let d_w11 = 0.5 * (d_l11 - (d_l21 * l21 + d_l22 * l22) / l11) / l11;
+        let (d_x, d_y) = (d[0] / self.denominator, d[1] / self.denominator);
+
         let (zz, zn) = (c.z * c.z, c.z * n.z);
         let tilt_squared = n.x * n.x + n.y * n.y;
-        let twist = |g: Vector3<f64>, h: Vector3<f64>| {
-            let turn = c.cross(&g) + n.cross(&h);
-            SVector::<f64, 6>::new(g.x, g.y, g.z, turn.x, turn.y, turn.z)
-        };
-        let d_log_denominator =
-            twist(Vector3::new(0.0, 0.0, 2.0 * c.z), Vector3::new(-2.0 * rr * n.x, -2.0 * rr * n.y, 0.0))
-                / self.denominator;
-        let d_x = twist(Vector3::new(c.z, 0.0, c.x), Vector3::new(rr * n.z, 0.0, rr * n.x)) / self.denominator
-            - d_log_denominator * self.centre[0];
-        let d_y = twist(Vector3::new(0.0, c.z, c.y), Vector3::new(0.0, rr * n.z, rr * n.y)) / self.denominator
-            - d_log_denominator * self.centre[1];
-        let d_w11 = twist(
-            Vector3::new(
-                2.0 * (tilt_squared * c.x + zn * n.x),
-                0.0,
-                2.0 * (c.z * (1.0 - n.x * n.x) + n.z * c.x * n.x),
-            ),
-            Vector3::new(
-                2.0 * (n.x * (c.x * c.x - zz) + zn * c.x),
-                2.0 * n.y * (c.x * c.x - rr),
-                2.0 * c.z * c.x * n.x,
-            ),
-        );
         let crossed = c.x * n.y + n.x * c.y;
-        let d_w12 = twist(
-            Vector3::new(
-                tilt_squared * c.y + zn * n.y,
-                tilt_squared * c.x + zn * n.x,
-                n.z * crossed - 2.0 * c.z * n.x * n.y,
-            ),
-            Vector3::new(
-                (rr - zz) * n.y + 2.0 * n.x * c.x * c.y + zn * c.y,
-                (rr - zz) * n.x + 2.0 * n.y * c.x * c.y + zn * c.x,
-                c.z * crossed,
-            ),
-        );
-        // Gradients n in C and C in n: rotating both changes nothing.
-        let d_log_distance = twist(*n, *c) / self.distance;
-        let [l11, l21, l22] = self.triangle;
-        let d_l11 = d_w11 / (2.0 * l11);
-        let d_l21 = (d_w12 - d_l11 * l21) / l11;
-        let d_l22 = (d_log_denominator * 0.5 + d_log_distance - d_l11 / l11) * l22;
-        let mut jacobian = SMatrix::<f64, 5, 6>::zeros();
-        jacobian.set_row(0, &d_x.transpose());
-        jacobian.set_row(1, &d_y.transpose());
-        for (row, (d_l, l)) in [(d_l11, l11), (d_l21, l21), (d_l22, l22)].into_iter().enumerate() {
-            jacobian.set_row(row + 2, &((d_l - d_log_denominator * l) * self.scale).transpose());
-        }
-        jacobian
+        let along_x = tilt_squared * c.x + zn * n.x;
+        let along_y = tilt_squared * c.y + zn * n.y;
+        let g = Vector3::new(
+            d_x * c.z + 2.0 * d_w11 * along_x + d_w12 * along_y,
+            d_y * c.z + d_w12 * along_x,
+            d_x * c.x
+                + d_y * c.y
+                + 2.0 * d_denominator * c.z
+                + 2.0 * d_w11 * (c.z * (1.0 - n.x * n.x) + n.z * c.x * n.x)
+                + d_w12 * (n.z * crossed - 2.0 * c.z * n.x * n.y),
+        ) + n * d_distance;
+        let h = Vector3::new(
+            rr * (d_x * n.z - 2.0 * d_denominator * n.x)
+                + 2.0 * d_w11 * (n.x * (c.x * c.x - zz) + zn * c.x)
+                + d_w12 * ((rr - zz) * n.y + 2.0 * n.x * c.x * c.y + zn * c.y),
+            rr * (d_y * n.z - 2.0 * d_denominator * n.y)
+                + 2.0 * d_w11 * n.y * (c.x * c.x - rr)
+                + d_w12 * ((rr - zz) * n.x + 2.0 * n.y * c.x * c.y + zn * c.x),
+            rr * (d_x * n.x + d_y * n.y) + c.z * (2.0 * d_w11 * c.x * n.x + d_w12 * crossed),
+        ) + c * d_distance;
+        let turn = c.cross(&g) + n.cross(&h);
+        SVector::<f64, 6>::new(g.x, g.y, g.z, turn.x, turn.y, turn.z)
     }
 }
 
@@ -194,12 +181,8 @@ impl Boundary {
 /// chapter 3): `f'_i = sum over m of (-1)^(m+1) cot(m pi / n) / 2 (f_(i+m) - f_(i-m))`.
 #[inline]
 fn along(f: &[f64; BOUNDARY]) -> [f64; BOUNDARY] {
-    // cot(pi/8), cot(pi/4), cot(3 pi/8), halved, with alternating signs.
-    const C: [f64; 3] = [
-        0.5 * (1.0 + std::f64::consts::SQRT_2),
-        -0.5,
-        0.5 * (std::f64::consts::SQRT_2 - 1.0),
-    ];
+    // cot(pi/6) and cot(pi/3), halved, with alternating signs; cot(pi/2) is zero.
+    const C: [f64; 2] = [0.866_025_403_784_438_6, -0.288_675_134_594_812_9];
     from_fn(|i| {
         let mut sum = 0.0;
         for (m, c) in C.iter().enumerate() {

@@ -4,8 +4,6 @@
 //! the projection of the disc's centre: with focal length f, radius r, depth Z and tilt a the two differ by about
 //! `f r^2 sin(2 a) / (2 Z^2)` pixels. What is predicted here is the centroid.
 
-use std::array::from_fn;
-
 use nalgebra::{Matrix2, Matrix2x6, SMatrix, Vector2, Vector3};
 
 use super::circle::{BOUNDARY, Boundary, CIRCLE, Ellipse};
@@ -32,7 +30,9 @@ impl Feature {
             return Err(Error::invalid("the position of a feature is not finite"));
         }
         if !(radius.is_finite() && radius >= 0.0) {
-            return Err(Error::invalid(format!("the radius of a feature must be 0 or positive metres, found {radius}")));
+            return Err(Error::invalid(format!(
+                "the radius of a feature must be 0 or positive metres, found {radius}"
+            )));
         }
         Ok(Self { position, radius })
     }
@@ -78,8 +78,7 @@ impl Camera {
             let (pixel, d_point) = self.project_with_point_derivative(&point)?;
             return Some((pixel, point_to_twist(&point, &d_point)));
         }
-        let observation = self.observe_circle_with_derivatives::<false>(t_camera_target, feature)?;
-        Some((observation.pixel, observation.d_twist))
+        self.observe_circle_with_derivatives(t_camera_target, feature, None)
     }
 
     /// [`Camera::observe`] with all derivatives.
@@ -94,7 +93,10 @@ impl Camera {
                 d_parameters: projection.d_parameters,
             });
         }
-        self.observe_circle_with_derivatives::<true>(t_camera_target, feature)
+        let mut d_parameters = ParameterJacobian::zeros();
+        let (pixel, d_twist) =
+            self.observe_circle_with_derivatives(t_camera_target, feature, Some(&mut d_parameters))?;
+        Some(Observation { pixel, d_twist, d_parameters })
     }
 
     fn observe_circle(&self, t_camera_target: &Se3, feature: &Feature) -> Option<Vector2<f64>> {
@@ -105,7 +107,7 @@ impl Camera {
             return Some(self.to_pixel(x, y));
         }
         let mut boundary = Boundary::default();
-        for (i, at) in ellipse.boundary().enumerate() {
+        for (i, at) in ellipse.boundary().iter().enumerate() {
             let bent = self.bend(at[0], at[1])?;
             boundary.x[i] = bent.x - middle.x;
             boundary.y[i] = bent.y - middle.y;
@@ -114,25 +116,21 @@ impl Camera {
         Some(self.to_pixel(middle.x + centroid.x, middle.y + centroid.y))
     }
 
-    fn observe_circle_with_derivatives<const PARAMETERS: bool>(
+    /// `d_parameters`, where wanted, starts as zero.
+    fn observe_circle_with_derivatives(
         &self,
         t_camera_target: &Se3,
         feature: &Feature,
-    ) -> Option<Observation> {
+        mut d_parameters: Option<&mut ParameterJacobian>,
+    ) -> Option<(Vector2<f64>, Matrix2x6<f64>)> {
         let ellipse = Ellipse::of(t_camera_target, feature)?;
-        let d_ellipse = ellipse.d_twist();
         let [x, y] = ellipse.centre;
         let middle = self.bend(x, y)?;
-        let mut d_parameters = ParameterJacobian::zeros();
-        let mut d_shape = SMatrix::<f64, 2, 5>::zeros();
+        // Gradients of the centroid's coordinates in centre and root of the ellipse.
+        let (mut d_x, mut d_y) = ([1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0, 0.0]);
         let mut centroid = Vector2::new(middle.x, middle.y);
-        if self.lens == Lens::Pinhole {
-            d_shape.fixed_view_mut::<2, 2>(0, 0).fill_with_identity();
-        } else {
-            let at: [[f64; 2]; BOUNDARY] = {
-                let mut points = ellipse.boundary();
-                from_fn(|_| points.next().expect("as many as there are"))
-            };
+        if self.lens != Lens::Pinhole {
+            let at = ellipse.boundary();
             let mut boundary = Boundary::default();
             let mut lens = [Matrix2::zeros(); BOUNDARY];
             for i in 0..BOUNDARY {
@@ -143,29 +141,35 @@ impl Camera {
             }
             let (offset, weights) = boundary.centroid();
             centroid += offset;
+            (d_x, d_y) = ([0.0; 5], [0.0; 5]);
             let mut d_bent = ParameterJacobian::zeros();
             for i in 0..BOUNDARY {
                 let d_at = weights[i] * lens[i];
                 let (cos, sin) = CIRCLE[i];
-                let (along_x, along_y) = (d_at.column(0), d_at.column(1));
-                d_shape.column_mut(0).axpy(1.0, &along_x, 1.0);
-                d_shape.column_mut(1).axpy(1.0, &along_y, 1.0);
-                d_shape.column_mut(2).axpy(cos, &along_x, 1.0);
-                d_shape.column_mut(3).axpy(cos, &along_y, 1.0);
-                d_shape.column_mut(4).axpy(sin, &along_y, 1.0);
-                if PARAMETERS {
+                for (d, x, y) in [(&mut d_x, d_at.m11, d_at.m12), (&mut d_y, d_at.m21, d_at.m22)] {
+                    d[0] += x;
+                    d[1] += y;
+                    d[2] += cos * x;
+                    d[3] += cos * y;
+                    d[4] += sin * y;
+                }
+                if let Some(d_parameters) = d_parameters.as_mut() {
                     self.bend_coefficients(at[i][0], at[i][1], &mut d_bent);
-                    d_parameters += weights[i] * d_bent;
+                    for column in 4..self.lens.parameter_count() {
+                        let d = weights[i] * d_bent.column(column);
+                        d_parameters[(0, column)] += d.x;
+                        d_parameters[(1, column)] += d.y;
+                    }
                 }
             }
         }
-        if PARAMETERS {
-            self.finish_parameters(centroid.x, centroid.y, &mut d_parameters);
+        if let Some(d_parameters) = d_parameters {
+            self.finish_parameters(centroid.x, centroid.y, d_parameters);
         }
-        let mut d_twist = d_shape * d_ellipse;
-        d_twist.row_mut(0).scale_mut(self.parameters[0]);
-        d_twist.row_mut(1).scale_mut(self.parameters[1]);
-        Some(Observation { pixel: self.to_pixel(centroid.x, centroid.y), d_twist, d_parameters })
+        let mut d_twist = Matrix2x6::zeros();
+        d_twist.set_row(0, &(ellipse.pull_back(&d_x) * self.parameters[0]).transpose());
+        d_twist.set_row(1, &(ellipse.pull_back(&d_y) * self.parameters[1]).transpose());
+        Some((self.to_pixel(centroid.x, centroid.y), d_twist))
     }
 }
 

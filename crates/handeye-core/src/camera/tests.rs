@@ -175,7 +175,8 @@ fn the_pole_of_the_rational_model_ends_the_view() {
 #[test]
 fn the_fisheye_ends_where_its_angle_turns_back() {
     // theta - theta^3 / 3 turns back at 1 rad.
-    let camera = Camera::new(Lens::KannalaBrandt, &[300.0, 300.0, 0.0, 0.0, -1.0 / 3.0, 0.0, 0.0, 0.0]).unwrap();
+    let camera =
+        Camera::new(Lens::KannalaBrandt, &[300.0, 300.0, 0.0, 0.0, -1.0 / 3.0, 0.0, 0.0, 0.0]).unwrap();
     let at = |theta: f64| Vector3::new(theta.sin(), 0.0, theta.cos());
     assert!(camera.project(&at(0.999)).is_some());
     assert!(camera.project(&at(1.001)).is_none());
@@ -190,8 +191,7 @@ fn the_fisheye_ends_where_its_angle_turns_back() {
 #[test]
 fn decentring_may_fold_before_the_radius_does() {
     // x + 3 p2 x^2 turns back at x = -1 / (6 p2) although the radial part never does.
-    let camera =
-        Camera::new(Lens::BrownConrady4, &[1000.0, 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2]).unwrap();
+    let camera = Camera::new(Lens::BrownConrady4, &[1000.0, 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2]).unwrap();
     assert!(camera.project(&Vector3::new(-0.83, 0.0, 1.0)).is_some());
     assert!(camera.project(&Vector3::new(-0.84, 0.0, 1.0)).is_none());
 }
