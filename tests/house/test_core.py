@@ -1,4 +1,4 @@
-"""The core stays mathematics: clippy refuses files, clock and printing; this looks at what it is built from."""
+"""The core stays mathematics: clippy refuses files, clock and printing; here is what it is built from."""
 
 import tomllib
 from pathlib import Path
