@@ -146,7 +146,15 @@ impl Se3 {
             return Err(Error::NotRigid { deviation });
         }
         let translation = m.fixed_view::<3, 1>(0, 3).into_owned();
-        Ok(Self::new(nearest_rotation(&rotation)?, translation))
+        // Newton-Schulz: from a deviation below RIGID_TOLERANCE two steps reach rounding, without an SVD.
+        let mut rotation = rotation;
+        if deviation > 1e-15 {
+            for _ in 0..2 {
+                let gram = rotation.transpose() * rotation;
+                rotation *= Matrix3::identity() * 1.5 - gram * 0.5;
+            }
+        }
+        Ok(Self::new(rotation, translation))
     }
 
     /// The homogeneous 4 x 4 matrix.
@@ -228,11 +236,7 @@ fn q_block(rho: &Vector3<f64>, phi: &Vector3<f64>) -> Matrix3<f64> {
     let (rx, px) = (hat(rho), hat(phi));
     let a2 = a * a;
     let (c1, c2, c3) = if a2 < 1e-4 {
-        (
-            1.0 / 6.0 - a2 / 120.0,
-            1.0 / 24.0 - a2 / 720.0,
-            1.0 / 120.0 - a2 / 2520.0,
-        )
+        (1.0 / 6.0 - a2 / 120.0, 1.0 / 24.0 - a2 / 720.0, 1.0 / 120.0 - a2 / 2520.0)
     } else {
         let (s, c) = a.sin_cos();
         (
@@ -252,10 +256,7 @@ impl std::ops::Mul for Se3 {
 
     #[inline]
     fn mul(self, other: Se3) -> Se3 {
-        Se3::new(
-            self.rotation * other.rotation,
-            self.rotation * other.translation + self.translation,
-        )
+        Se3::new(self.rotation * other.rotation, self.rotation * other.translation + self.translation)
     }
 }
 
@@ -300,6 +301,17 @@ mod tests {
             let product = analytic * Se3::left_jacobian_inverse(&xi);
             prop_assert!((product - Matrix6::identity()).amax() < 1e-8);
         }
+    }
+
+    #[test]
+    fn rounding_in_a_rotation_is_repaired() {
+        let mut m = Se3::exp(&Vector6::new(1.0, 2.0, 3.0, 0.3, -0.8, 1.2)).to_matrix();
+        m[(0, 1)] += 2e-5;
+        m[(2, 2)] -= 1e-5;
+        let repaired = Se3::from_matrix(&m).unwrap().rotation;
+        assert!((repaired.transpose() * repaired - Matrix3::identity()).amax() < 1e-14);
+        let given: Matrix3<f64> = m.fixed_view::<3, 3>(0, 0).into_owned();
+        assert!((repaired - nearest_rotation(&given).unwrap()).amax() < 1e-8);
     }
 
     #[test]

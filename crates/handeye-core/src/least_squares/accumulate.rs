@@ -156,30 +156,6 @@ pub fn view_block(
     Some(ViewBlock { m, g, columns: columns.map(|c| c.1), cost, squared_px })
 }
 
-/// The cost of view `k` alone, as [`view_block`] but without derivatives.
-pub(super) fn view_cost(
-    problem: &Problem,
-    k: usize,
-    camera: &Camera,
-    board_scale: f64,
-    pose: &Se3,
-    sigma: f64,
-    loss: Loss,
-) -> Option<f64> {
-    let range = problem.samples(k);
-    let information = 1.0 / (sigma * sigma);
-    let mut cost = 0.0;
-    for i in range {
-        let feature = problem.features()[i].scaled(1.0 + board_scale);
-        let mut residual = camera.observe(pose, &feature)? - problem.pixels()[i];
-        if let Some(w) = problem.whitening(i) {
-            residual = w * residual;
-        }
-        cost += loss.evaluate(residual.norm_squared() * information).0;
-    }
-    cost.is_finite().then_some(cost)
-}
-
 /// Widest set of pixel parameters: all of a lens' and the board scale.
 const MAX_COLUMNS: usize = crate::camera::MAX_PARAMETERS + 1;
 

@@ -4,7 +4,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SMatrix, Vector6};
 
-use super::accumulate::{ViewBlock, view_block, view_cost};
+use super::accumulate::{ViewBlock, view_block};
 use super::loss::Loss;
 use super::marginal::{Eliminated, eliminate};
 use super::model::{Model, Side};
@@ -181,10 +181,11 @@ impl Solver<'_> {
             }
             let small_step = step.amax() < self.options.step_tolerance;
             let trial_state = self.step(&state, &current, &system, &step);
+            // Linearising costs little more than the cost alone, and most trials are accepted.
             let trial = trial_state
                 .as_ref()
-                .filter(|s| !damped || self.cost(s).is_some_and(|c| c < current.cost))
-                .and_then(|s| self.evaluate(s).ok());
+                .and_then(|s| self.evaluate(s).ok())
+                .filter(|t| !damped || t.cost < current.cost);
             let Some((trial_state, trial)) = trial_state.zip(trial) else {
                 if !damped {
                     break Ending::Diverged;
@@ -274,17 +275,6 @@ impl Solver<'_> {
             values.push(state.board_scale);
         }
         DVector::from_vec(values)
-    }
-
-    fn cost(&self, state: &State) -> Option<f64> {
-        let mut cost = self.prior_cost(state);
-        for (i, k) in self.views.iter().enumerate() {
-            let (pose, ..) = self.pose(state, i);
-            let sigma = self.model.pixel_sigma[*k];
-            let loss = self.options.loss;
-            cost += view_cost(self.problem, *k, &state.camera, state.board_scale, &pose, sigma, loss)?;
-        }
-        Some(cost)
     }
 
     /// Linearises every view; the index of the first view that cannot be seen otherwise.
