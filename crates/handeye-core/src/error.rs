@@ -61,7 +61,9 @@ impl fmt::Display for Error {
                 f,
                 "not a rigid transform: deviates from a rotation with last row 0 0 0 1 by {deviation:.2e}"
             ),
-            Self::InvalidInput { what } | Self::Degenerate { what } | Self::Numerical { what } => f.write_str(what),
+            Self::InvalidInput { what } | Self::Degenerate { what } | Self::Numerical { what } => {
+                f.write_str(what)
+            }
             Self::TooFewViews { given, needed } => {
                 write!(f, "{given} views given, at least {needed} needed")
             }

@@ -8,5 +8,6 @@ pub mod closed_form;
 pub mod error;
 pub mod information;
 pub mod least_squares;
+pub mod pose;
 pub mod se3;
 pub mod testing;

@@ -65,20 +65,14 @@ impl Random {
 
 /// Random twists for property tests: components up to `metres`, rotation angle up to `radians`.
 #[cfg(test)]
-pub fn twist(
-    metres: f64,
-    radians: f64,
-) -> impl proptest::strategy::Strategy<Value = nalgebra::Vector6<f64>> {
+pub fn twist(metres: f64, radians: f64) -> impl proptest::strategy::Strategy<Value = nalgebra::Vector6<f64>> {
     use proptest::prelude::*;
-    (
-        prop::array::uniform3(-metres..metres),
-        prop::array::uniform3(-1.0..1.0_f64),
-        0.0..radians,
-    )
-        .prop_map(|(t, axis, angle)| {
+    (prop::array::uniform3(-metres..metres), prop::array::uniform3(-1.0..1.0_f64), 0.0..radians).prop_map(
+        |(t, axis, angle)| {
             let axis = nalgebra::Vector3::from(axis);
             let norm = axis.norm().max(1e-9);
             let phi = axis * (angle / norm);
             nalgebra::Vector6::new(t[0], t[1], t[2], phi.x, phi.y, phi.z)
-        })
+        },
+    )
 }
