@@ -1,19 +1,22 @@
 //! Projection and its inverse, batched.
 
-use handeye_core::camera::{Camera, Lens, ParameterJacobian, Projection};
-use nalgebra::{Matrix2x3, Vector2, Vector3};
+use handeye_core::camera::{Camera, Feature, Lens, ParameterJacobian, Projection};
+use handeye_core::pose;
+use nalgebra::{Matrix2x3, SVector, Vector2, Vector3};
 use numpy::{IntoPyArray, PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::convert::{self, Array};
-use crate::errors::to_python;
+use crate::errors::{invalid, to_python};
 
 /// Registers the functions of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(lens_parameter_count, module)?)?;
     module.add_function(wrap_pyfunction!(project, module)?)?;
     module.add_function(wrap_pyfunction!(project_jacobians, module)?)?;
-    module.add_function(wrap_pyfunction!(unproject, module)?)
+    module.add_function(wrap_pyfunction!(unproject, module)?)?;
+    module.add_function(wrap_pyfunction!(project_features, module)?)?;
+    module.add_function(wrap_pyfunction!(refine_pose, module)?)
 }
 
 type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -27,6 +30,19 @@ pub fn camera(py: Python<'_>, lens: &str, parameters: &Array<'_>) -> PyResult<Ca
     Lens::from_name(lens)
         .and_then(|lens| Camera::new(lens, &parameters))
         .map_err(|error| to_python(py, error))
+}
+
+/// Features from points `(N, 3)` and radii `(N,)`; an error names the index.
+pub fn features(py: Python<'_>, points: &Array<'_>, radii: &Array<'_>) -> PyResult<Vec<Feature>> {
+    let points = convert::vectors::<3>(py, "points", points)?;
+    let radii = convert::scalars(py, "radii", radii)?;
+    if points.len() != radii.len() {
+        return Err(invalid(py, &format!("{} points but {} radii", points.len(), radii.len())));
+    }
+    let feature = |(i, (position, radius))| {
+        Feature::new(position, radius).map_err(|error| invalid(py, &format!("feature {i}: {error}")))
+    };
+    points.into_iter().zip(radii).enumerate().map(feature).collect()
 }
 
 #[pyfunction]
@@ -89,11 +105,53 @@ fn unproject<'py>(
     Ok(optional_out(py, &rays, Vector3::repeat(f64::NAN)))
 }
 
+#[pyfunction]
+#[expect(non_snake_case, reason = "the name in Python")]
+fn project_features<'py>(
+    py: Python<'py>,
+    lens: &str,
+    parameters: Array<'py>,
+    T_camera_target: Array<'py>,
+    points: Array<'py>,
+    radii: Array<'py>,
+) -> PyResult<(Floats<'py>, Flags<'py>)> {
+    let camera = camera(py, lens, &parameters)?;
+    let transform = convert::transform(py, "T_camera_target", &T_camera_target)?;
+    let features = features(py, &points, &radii)?;
+    let pixels: Vec<_> = py.detach(|| features.iter().map(|f| camera.observe(&transform, f)).collect());
+    Ok(optional_out(py, &pixels, NAN_PIXEL))
+}
+
+#[pyfunction]
+#[expect(non_snake_case, reason = "the name in Python")]
+fn refine_pose<'py>(
+    py: Python<'py>,
+    lens: &str,
+    parameters: Array<'py>,
+    points: Array<'py>,
+    radii: Array<'py>,
+    pixels: Array<'py>,
+    T_camera_target: Array<'py>,
+) -> PyResult<(Floats<'py>, f64, Floats<'py>)> {
+    let camera = camera(py, lens, &parameters)?;
+    let features = features(py, &points, &radii)?;
+    let pixels = convert::vectors::<2>(py, "pixels", &pixels)?;
+    let start = convert::transform(py, "T_camera_target", &T_camera_target)?;
+    let fit = py
+        .detach(|| pose::refine_pose(&camera, &features, &pixels, &start))
+        .map_err(|error| to_python(py, error))?;
+    Ok((
+        convert::matrix_out(py, &fit.t_camera_target.to_matrix()),
+        fit.rmse_px,
+        convert::matrix_out(py, &fit.information),
+    ))
+}
+
 /// Vectors with NaN rows where there is none, and which there are.
 fn optional_out<'py, const D: usize>(
     py: Python<'py>,
-    vectors: &[Option<nalgebra::SVector<f64, D>>],
-    missing: nalgebra::SVector<f64, D>,
+    vectors: &[Option<SVector<f64, D>>],
+    missing: SVector<f64, D>,
 ) -> (Floats<'py>, Flags<'py>) {
     let valid: Vec<bool> = vectors.iter().map(Option::is_some).collect();
     let filled: Vec<_> = vectors.iter().map(|v| v.unwrap_or(missing)).collect();

@@ -22,24 +22,24 @@ fn se3_exp<'py>(py: Python<'py>, xi: Array<'py>) -> PyResult<Bound<'py, PyArrayD
 }
 
 #[pyfunction]
-#[pyo3(signature = (transforms, /))]
-fn se3_log<'py>(py: Python<'py>, transforms: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let transforms = convert::transforms(py, "T", &transforms)?;
+#[expect(non_snake_case, reason = "the name in Python")]
+fn se3_log<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let transforms = convert::transforms(py, "T", &T)?;
     let twists: Vec<_> = py.detach(|| transforms.iter().map(Se3::log).collect());
     Ok(convert::vectors_out(py, &twists))
 }
 
 #[pyfunction]
-#[pyo3(signature = (transforms, /))]
-fn se3_adjoint<'py>(py: Python<'py>, transforms: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let transforms = convert::transforms(py, "T", &transforms)?;
+#[expect(non_snake_case, reason = "the name in Python")]
+fn se3_adjoint<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let transforms = convert::transforms(py, "T", &T)?;
     let adjoints: Vec<_> = py.detach(|| transforms.iter().map(Se3::adjoint).collect());
     Ok(convert::matrices_out(py, &adjoints))
 }
 
 #[pyfunction]
-#[pyo3(signature = (transform, /))]
-fn nearest_rigid<'py>(py: Python<'py>, transform: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let transform = convert::transform(py, "T", &transform)?;
+#[expect(non_snake_case, reason = "the name in Python")]
+fn nearest_rigid<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let transform = convert::transform(py, "T", &T)?;
     Ok(convert::matrix_out(py, &transform.to_matrix()))
 }

@@ -9,10 +9,10 @@ use nalgebra::DMatrix;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
+use crate::camera::{camera, features};
 use crate::convert::{self, Array};
 use crate::errors::{invalid, to_python};
 use crate::model::{side, square};
-use crate::problem::{camera, features};
 
 /// Registers the classes of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,12 +1,12 @@
 //! Measurements and their solution, as Python values.
 
-use handeye_core::camera::{Camera, Feature, Lens};
 use handeye_core::least_squares::{
     Loss, Method, Options, Problem as CoreProblem, Solution as CoreSolution, Start, solve, view_block,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
+use crate::camera::{camera, features};
 use crate::convert::{self, Array};
 use crate::errors::{invalid, to_python};
 use crate::model::Model;
@@ -27,22 +27,6 @@ pub struct Problem {
 #[pyclass(frozen, module = "handeye._core")]
 pub struct Solution {
     inner: CoreSolution,
-}
-
-/// Features from points and radii.
-pub fn features(py: Python<'_>, points: &Array<'_>, radii: &Array<'_>) -> PyResult<Vec<Feature>> {
-    let points = convert::vectors::<3>(py, "points", points)?;
-    let radii = convert::scalars(py, "radii", radii)?;
-    if points.len() != radii.len() {
-        return Err(invalid(py, &format!("{} points but {} radii", points.len(), radii.len())));
-    }
-    Ok(points.into_iter().zip(radii).map(|(position, radius)| Feature { position, radius }).collect())
-}
-
-/// A camera from its lens' name and its parameters.
-pub fn camera(py: Python<'_>, lens: &str, parameters: &Array<'_>) -> PyResult<Camera> {
-    let parameters = convert::scalars(py, "parameters", parameters)?;
-    Lens::from_name(lens).and_then(|lens| Camera::new(lens, &parameters)).map_err(|e| to_python(py, e))
 }
 
 fn loss(py: Python<'_>, name: &str, scale: f64) -> PyResult<Loss> {
