@@ -20,6 +20,8 @@ nitpicky = True
 
 html_theme = "furo"
 html_title = "handeye"
+html_static_path = ["_static"]
+html_css_files = ["formulas.css"]
 html_math_renderer = "mathml"
 html_show_sphinx = False
 html_copy_source = False

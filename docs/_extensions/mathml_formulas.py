@@ -3,6 +3,7 @@
 A formula that cannot be converted is a warning that names the page and line, and so an error in `make docs`.
 """
 
+import xml.etree.ElementTree as ET
 from html import escape
 
 from docutils import nodes
@@ -20,7 +21,12 @@ def to_mathml(node: nodes.Element, display: str) -> str:
     """The formula of `node` as one `<math>` element; on failure its LaTeX source, and a warning."""
     latex = node.astext()
     try:
-        return convert(latex, display=display)
+        mathml = convert(latex, display=display)
+        # What it does not know, the converter passes on: a command as text, a stray & as markup.
+        unknown = [part for part in ET.fromstring(mathml).itertext() if "\\" in part]
+        if unknown:
+            raise ValueError(f"unknown command {unknown[0]}")
+        return mathml
     except Exception as error:  # noqa: BLE001 - the converter raises many classes; each becomes a named warning
         logger.warning("formula not understood (%s): %s", error, latex, location=node)
         return f"<code>{escape(latex)}</code>"
@@ -34,7 +40,7 @@ def visit_inline(translator: HTML5Translator, node: nodes.math) -> None:
 
 def visit_block(translator: HTML5Translator, node: nodes.math_block) -> None:
     """Write a formula of its own, with its number if it has a label."""
-    translator.body.append(translator.starttag(node, "div", CLASS="math"))
+    translator.body.append(translator.starttag(node, "div", CLASS="formula"))
     if node["number"]:
         number = get_node_equation_number(translator, node)
         translator.body.append(f'<span class="eqno">({number})')
