@@ -1,0 +1,28 @@
+"""Recordings on disk: our own format, and importers for the layouts of others.
+
+An importer gives an `ImageSet`, images and poses in which the points are still to be found; our format gives
+a `Recording`, ready to be solved.
+"""
+
+from handeye.datasets.image_set import ImageSet, ImportOptions, Shot
+from handeye.datasets.importer import Importer
+from handeye.datasets.loading import IMPORTERS, load
+from handeye.datasets.plausibility import DataWarning, recording_warnings
+from handeye.datasets.poses_csv import PoseTable, read_poses_csv
+from handeye.datasets.recording_format import LoadedRecording, read_recording, write_recording
+
+__all__ = [
+    "IMPORTERS",
+    "DataWarning",
+    "ImageSet",
+    "ImportOptions",
+    "Importer",
+    "LoadedRecording",
+    "PoseTable",
+    "Shot",
+    "load",
+    "read_poses_csv",
+    "read_recording",
+    "recording_warnings",
+    "write_recording",
+]

@@ -1,0 +1,153 @@
+"""What a foreign layout gives: images and robot poses, before detection."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from numpy.typing import ArrayLike
+
+from handeye.datasets.image_header import image_size
+from handeye.datasets.plausibility import DataWarning
+from handeye.datasets.reading import inside
+from handeye.errors import InputError
+from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth, View
+from handeye.types.view import check_relative_path, check_view_name
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One image and the pose of the robot at that moment; the points are still to be found.
+
+    Parameters
+    ----------
+    name
+        Name of the view to be.
+    image
+        Path of the image relative to the folder of the image set, with `/`.
+    T_base_flange
+        Pose of the flange in the robot base.
+
+    Raises
+    ------
+    InputError
+        A name that no file can have, or a path that leaves the folder.
+    """
+
+    name: str
+    image: str
+    T_base_flange: Pose
+
+    def __post_init__(self) -> None:
+        check_view_name(self.name)
+        check_relative_path(self.image, f"view {self.name}: image")
+
+    def with_points(self, point_ids: ArrayLike, pixels: ArrayLike) -> View:
+        """Return the view with the points (N,) found at pixels (N, 2).
+
+        Raises
+        ------
+        InputError
+            As `View`.
+        """
+        return View(self.name, self.T_base_flange, point_ids, pixels, image=self.image)
+
+
+@dataclass(frozen=True)
+class ImageSet:
+    """Images with robot poses, and what the files say about target and camera.
+
+    Attributes
+    ----------
+    name
+        Name of the set.
+    layout
+        Name of the layout it was read from.
+    folder
+        Where it was read from; images are relative to it.
+    mounting
+        Where the camera sits.
+    target
+        The calibration target.
+    shots
+        Images and poses, in the order of the files.
+    image_size_px
+        Width and height of all images; None where the format of the files does not tell without decoding.
+    camera
+        The camera's calibration, None if the files hold none.
+    truth
+        What is known to be true, None for most sets.
+    source
+        Where the data came from, in words; to be cited with results.
+    warnings
+        Values that are possible but hardly meant, and choices that the files left open.
+    """
+
+    name: str
+    layout: str
+    folder: Path
+    mounting: Mounting
+    target: Target
+    shots: tuple[Shot, ...]
+    image_size_px: tuple[int, int] | None = None
+    camera: Camera | None = None
+    truth: Truth | None = None
+    source: str = ""
+    warnings: tuple[DataWarning, ...] = ()
+
+    def image_path(self, shot: Shot) -> Path:
+        """Return the path of the image of a shot."""
+        return self.folder / shot.image
+
+    def recording(self, camera: Camera, views: Iterable[View]) -> Recording:
+        """Return the recording made of the views in which the target was found.
+
+        Raises
+        ------
+        InputError
+            As `Recording`.
+        """
+        return Recording(self.name, self.mounting, camera, self.target, tuple(views), self.truth, self.source)
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """What the files of a layout may leave open.
+
+    Parameters
+    ----------
+    target
+        The calibration target; takes the place of what the files say.
+    pattern
+        Rows and columns of inner corners of a chessboard, where the files have only the size of its squares.
+    mounting
+        Where the camera sits; None for what the files say, or else in the hand.
+    """
+
+    target: Target | None = None
+    pattern: tuple[int, int] | None = None
+    mounting: Mounting | None = None
+
+
+def common_image_size(folder: Path, shots: Iterable[Shot]) -> tuple[int, int] | None:
+    """Return width and height that all images have; None where the format does not tell.
+
+    Raises
+    ------
+    InputError
+        An image that is missing, truncated, or of another size than the first.
+    """
+    first: tuple[Shot, tuple[int, int]] | None = None
+    for shot in shots:
+        size = image_size(inside(folder, shot.image, f"view {shot.name}: image"))
+        if size is None:
+            continue
+        if first is None:
+            first = shot, size
+        elif size != first[1]:
+            raise InputError(
+                f"{folder}: image {shot.image} has {size[0]} x {size[1]} pixels, but {first[0].image} has "
+                f"{first[1][0]} x {first[1][1]}",
+                code="image_size",
+                hint="a set must come from one camera at one resolution",
+            )
+    return None if first is None else first[1]

@@ -1,0 +1,116 @@
+"""One door for all data: our recordings and the layouts of others."""
+
+import os
+from pathlib import Path
+
+from handeye.datasets import recording_format, robot_cal_tools, rwhe_calib
+from handeye.datasets.image_set import ImageSet, ImportOptions
+from handeye.datasets.importer import Importer
+from handeye.datasets.reading import existing_folder, is_file
+from handeye.datasets.recording_format import LoadedRecording
+from handeye.errors import InputError
+from handeye.types import Mounting, Target
+
+IMPORTERS: dict[str, Importer] = {
+    importer.name: importer for importer in (rwhe_calib.IMPORTER, robot_cal_tools.IMPORTER)
+}
+# Loading these runs or rebuilds whatever their author put in.
+_NEVER_LOADED = frozenset({".mat", ".pkl", ".pickle", ".npy", ".npz"})
+_MAX_LISTED = 10
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    layout: str | None = None,
+    target: Target | None = None,
+    pattern: tuple[int, int] | None = None,
+    mounting: Mounting | None = None,
+) -> LoadedRecording | ImageSet:
+    """Read a folder: a recording of ours, or images and poses in a layout of others.
+
+    Parameters
+    ----------
+    path
+        The folder, or the file in it that tells the layout (such as `recording.toml`).
+    layout
+        Name of one of `IMPORTERS`; None to recognise it.
+    target, pattern, mounting
+        What the files of others leave open, see `ImportOptions`; not for a recording, which says it all.
+
+    Returns
+    -------
+    LoadedRecording or ImageSet
+        An `ImageSet` has no points yet: they are still to be detected.
+
+    Raises
+    ------
+    InputError
+        Nothing that can be read, or not what it claims to be.
+    """
+    options = ImportOptions(target, pattern, mounting)
+    folder = _folder(path)
+    if layout is not None:
+        importer = IMPORTERS.get(layout)
+        if importer is None:
+            raise InputError(
+                f"layout {layout!r}, expected one of {', '.join(IMPORTERS)}", code="unknown_format"
+            )
+        return importer.read(folder, options)
+    if is_file(folder / recording_format.FILE_NAME):
+        if options != ImportOptions():
+            raise InputError(
+                f"{folder}: a recording says its target and mounting itself",
+                code="options_unused",
+                hint=f"leave the options away, or change {recording_format.FILE_NAME}",
+            )
+        return recording_format.read_recording(folder)
+    fitting = recognise(folder)
+    if not fitting:
+        raise _not_recognised(folder)
+    if len(fitting) > 1:
+        names = " and ".join(importer.name for importer in fitting)
+        raise InputError(f"{folder}: looks like {names}", code="ambiguous_format", hint="name the layout")
+    return fitting[0].read(folder, options)
+
+
+def recognise(folder: Path) -> list[Importer]:
+    """Return the importers that recognise a folder."""
+    return [importer for importer in IMPORTERS.values() if importer.recognises(folder)]
+
+
+def _folder(path: str | os.PathLike[str]) -> Path:
+    """Return the folder that is meant by a path."""
+    try:
+        given = Path(path)
+        if given.suffix.lower() in _NEVER_LOADED:
+            raise InputError(
+                f"{given}: files of this kind are never loaded, as they can run code of their author",
+                code="unknown_format",
+                hint="give the folder with the text files",
+            )
+        known = {recording_format.FILE_NAME, rwhe_calib.POSES_FILE, *robot_cal_tools.LIST_FILES}
+        return existing_folder(given.parent if given.name in known and is_file(given) else given)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path!r}: not a path ({error})", code="unreadable") from error
+
+
+def _not_recognised(folder: Path) -> InputError:
+    kinds = "; ".join(
+        [f"a folder with {recording_format.FILE_NAME}", *(i.looks_like for i in IMPORTERS.values())]
+    )
+    below: list[str] = []
+    try:
+        with os.scandir(folder) as entries:
+            for entry, _ in zip(entries, range(1000), strict=False):
+                inner = folder / entry.name
+                if entry.is_dir() and (recognise(inner) or is_file(inner / recording_format.FILE_NAME)):
+                    below.append(entry.name)
+    except OSError:
+        below = []
+    hint = (
+        f"below it there are {', '.join(sorted(below)[:_MAX_LISTED])}: give one of these" if below else None
+    )
+    return InputError(
+        f"{folder}: nothing that can be read, expected {kinds}", code="unknown_format", hint=hint
+    )

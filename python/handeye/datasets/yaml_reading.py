@@ -1,0 +1,53 @@
+"""YAML from strangers: text, lists and tables, nothing else.
+
+Numbers stay text until a document type asks for them, so nothing depends on how YAML 1.1 guesses (``1e-3``
+is text to it, ``1:30`` a number in base 60). Aliases are refused: a few lines of them unfold to gigabytes. A
+key that is there twice is refused: the reader could not know which of the two was meant.
+"""
+
+from pathlib import Path
+from typing import cast
+
+import yaml
+
+from handeye.datasets.reading import MIB, read_text
+from handeye.errors import InputError
+
+# The pure Python parser reads about a tenth of this in a second; real files have a few kilobytes.
+MAX_BYTES = MIB
+
+
+def read_yaml(path: Path) -> object:
+    """Return the content of a YAML file as text, lists and tables.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is too large, or is not such YAML.
+    """
+    text = read_text(path, MAX_BYTES)
+    try:
+        root = cast("yaml.Node | None", yaml.compose(text, Loader=yaml.BaseLoader))  # pyright: ignore[reportUnknownMemberType]
+        return _plain(root, set())
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise InputError(f"{path}: not YAML as expected: {error}", code="not_yaml") from error
+
+
+def _plain(node: yaml.Node | None, seen: set[int]) -> object:
+    """Return what a node of the parsed text holds; an alias is a node that is met again."""
+    if node is None:
+        return None
+    if id(node) in seen:
+        raise ValueError("aliases (*name) are not accepted")
+    seen.add(id(node))
+    if isinstance(node, yaml.ScalarNode):
+        return str(node.value)
+    if isinstance(node, yaml.SequenceNode):
+        return [_plain(item, seen) for item in node.value]
+    table: dict[str, object] = {}
+    for key_node, value_node in node.value:
+        key = _plain(key_node, seen)
+        if not isinstance(key, str) or key in table:
+            raise ValueError(f"a key that is there twice or is not text, line {key_node.start_mark.line + 1}")
+        table[key] = _plain(value_node, seen)
+    return table
