@@ -54,7 +54,7 @@ check: build $(STAMPS)/dev ## format, lint, types, import directions
 	$(say) 'pyright'
 	@$(BIN)/pyright --pythonpath $(BIN)/python
 	$(say) 'lint-imports'
-	@$(BIN)/lint-imports
+	@$(BIN)/lint-imports --no-logo
 
 bench: build $(STAMPS)/dev ## measure the core and the Python side on this machine
 	$(say) 'benchmarks'
