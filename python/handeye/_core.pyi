@@ -69,3 +69,178 @@ def refine_pose(
     not finite, `DegenerateError` if the features do not determine the pose, and `SolveError` if one is not in view of the
     starting pose or the iteration does not converge.
     """
+
+# The pose of one view
+
+type _Fit = tuple[NDArray[float64], float, NDArray[float64]]
+
+def planar_pose(
+    lens: str, parameters: ArrayLike, points: ArrayLike, radii: ArrayLike, pixels: ArrayLike
+) -> tuple[_Fit, _Fit | None]:
+    """Pose of a planar target without a start, and the mirrored second minimum if there is one.
+
+    Each is `T_camera_target` (4, 4), its error in px (root mean square over the points of the residual's norm) and
+    its information (6, 6) at a pixel noise of 1 px.
+    """
+
+# Least squares
+
+class Model:
+    """Assumptions of a solve; parameters are `xi_x (6), xi_y (6)`, pixel parameters, kinematic parameters.
+
+    `pixel_sigma` (K,): noise of each view in px. `robot_side`: "left" or "right" of A. `robot_roots` (1 or K, 6, 6):
+    square roots of the covariance of the robot's error there. `free_camera`: indices of free camera parameters;
+    `board_scale`: whether the size of the board is free; `pixel_prior`: their prior information, in this order.
+    `kinematic_jacobians` (K, 6, q): `A <- exp(D q) A`; `kinematic_prior` (q, q). `chain_prior`: means X, Y (4, 4)
+    and standard deviations (6,) of their twists.
+    """
+
+    def __init__(
+        self,
+        pixel_sigma: ArrayLike,
+        *,
+        robot_side: str | None = None,
+        robot_roots: ArrayLike | None = None,
+        free_camera: list[int] | None = None,
+        board_scale: bool = False,
+        pixel_prior: ArrayLike | None = None,
+        kinematic_jacobians: ArrayLike | None = None,
+        kinematic_prior: ArrayLike | None = None,
+        chain_prior: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike] | None = None,
+    ) -> None: ...
+    @property
+    def parameter_count(self) -> int: ...
+
+class Problem:
+    """Measurements: view k holds the points `offsets[k]:offsets[k + 1]` and was taken at `A = motions[k]`."""
+
+    def __init__(
+        self,
+        lens: str,
+        parameters: ArrayLike,
+        points: ArrayLike,
+        radii: ArrayLike,
+        pixels: ArrayLike,
+        offsets: list[int],
+        motions: ArrayLike,
+        *,
+        covariances: ArrayLike | None = None,
+    ) -> None: ...
+    @property
+    def view_count(self) -> int: ...
+    def solve(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        model: Model,
+        *,
+        views: list[int] | None = None,
+        method: str = "levenberg_marquardt",
+        loss: str = "squared",
+        loss_scale: float = 3.0,
+        max_iterations: int = 100,
+        cost_tolerance: float = 1e-10,
+        step_tolerance: float = 1e-13,
+        gradient_tolerance: float = 1e-12,
+    ) -> Solution: ...
+    def squared_error(self, x: ArrayLike, y: ArrayLike, *, views: list[int] | None = None) -> float:
+        """Sum of squared residuals in px^2; infinite where the target is out of sight."""
+
+class Solution:
+    """The answer of a solve."""
+
+    @property
+    def x(self) -> NDArray[float64]: ...
+    @property
+    def y(self) -> NDArray[float64]: ...
+    @property
+    def parameters(self) -> list[float]: ...
+    @property
+    def board_scale(self) -> float: ...
+    @property
+    def kinematic(self) -> list[float]: ...
+    @property
+    def information(self) -> NDArray[float64]: ...
+    @property
+    def prior_information(self) -> NDArray[float64]: ...
+    @property
+    def cost(self) -> float: ...
+    @property
+    def initial_cost(self) -> float: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def ending(self) -> str: ...
+    @property
+    def is_converged(self) -> bool: ...
+    @property
+    def views(self) -> list[int]: ...
+    @property
+    def view_rmse_px(self) -> list[float]: ...
+    @property
+    def view_cost(self) -> list[float]: ...
+    @property
+    def corrections(self) -> NDArray[float64]: ...
+    @property
+    def correction_cost(self) -> list[float]: ...
+    @property
+    def poses(self) -> NDArray[float64]: ...
+    @property
+    def correction_log_determinant(self) -> float: ...
+
+# Information
+
+class Belief:
+    """Information (n, n) of all global parameters and what follows from it; raises DegenerateError if singular."""
+
+    def __init__(self, information: ArrayLike) -> None: ...
+    @property
+    def covariance(self) -> NDArray[float64]: ...
+    @property
+    def log_determinant(self) -> float: ...
+    @property
+    def entropy(self) -> float: ...
+    @property
+    def hand_eye_entropy(self) -> float: ...
+
+class Criterion:
+    """What a view is worth: entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue or tool_point."""
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        length_scale_m: float = 1e-3,
+        angle_scale_rad: float = 1e-3,
+        tool_points: ArrayLike | None = None,
+        over: str = "mean",
+    ) -> None: ...
+    @property
+    def name(self) -> str: ...
+
+class Predictor:
+    """Predicts what candidate views would tell, at motions A (N, 4, 4)."""
+
+    def __init__(
+        self,
+        lens: str,
+        parameters: ArrayLike,
+        points: ArrayLike,
+        radii: ArrayLike,
+        x: ArrayLike,
+        y: ArrayLike,
+        *,
+        pixel_sigma: float,
+        robot_side: str | None = None,
+        robot_root: ArrayLike | None = None,
+        free_camera: list[int] | None = None,
+        board_scale: bool = False,
+        image_size: tuple[float, float] | None = None,
+        margin_px: float = 0.0,
+        fewest: int = 3,
+    ) -> None: ...
+    def gains(self, belief: Belief, criterion: Criterion, motions: ArrayLike) -> NDArray[float64]:
+        """Gain (N,) of each candidate; NaN where too little of the target would be in sight."""
+
+    def informations(self, motions: ArrayLike) -> NDArray[float64]:
+        """Information (N, n, n) of each candidate; zero where too little would be in sight."""

@@ -8,6 +8,7 @@ pub mod closed_form;
 pub mod error;
 pub mod information;
 pub mod least_squares;
+pub mod planar_pose;
 pub mod pose;
 pub mod se3;
 pub mod testing;

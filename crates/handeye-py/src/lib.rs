@@ -10,12 +10,14 @@ mod errors;
 mod geometry;
 mod information;
 mod model;
+mod planar_pose;
 mod problem;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     camera::register(module)?;
     geometry::register(module)?;
+    planar_pose::register(module)?;
     problem::register(module)?;
     model::register(module)?;
     information::register(module)?;
