@@ -2,7 +2,8 @@
 
 Lengths are metres, angles radians, pixels have their centres at integers. A lens is named as in
 `handeye.types.Camera`; its parameters are `fx, fy, cx, cy, distortion...` in OpenCV's order.
-A wrong shape, a parameter out of its range or a transform that is not rigid raises `handeye.errors.InputError`.
+A wrong shape, a parameter out of its range or a transform that is not rigid raises
+`handeye.errors.InputError`.
 """
 
 from numpy import bool_, float64
@@ -20,7 +21,7 @@ def se3_adjoint(T: ArrayLike) -> NDArray[float64]:
     """Adjoints (N, 6, 6) of transforms (N, 4, 4): `exp(Ad(T) xi) = T exp(xi) T^-1`."""
 
 def nearest_rigid(T: ArrayLike) -> NDArray[float64]:
-    """The rigid transform (4, 4) nearest to a matrix (4, 4) that deviates from one by rounding, at most 1e-4."""
+    """The rigid transform (4, 4) nearest to a matrix (4, 4) that is off by rounding, at most 1e-4."""
 
 # Cameras
 
@@ -38,20 +39,19 @@ def project(
 def project_jacobians(
     lens: str, parameters: ArrayLike, points_camera: ArrayLike
 ) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[bool_]]:
-    """Pixels (N, 2), their derivatives in the points (N, 2, 3) and in the n parameters (N, 2, n), and which are seen."""
+    """Pixels (N, 2), derivatives in points (N, 2, 3) and in the n parameters (N, 2, n), which (N,) are seen."""
 
-def unproject(
-    lens: str, parameters: ArrayLike, uv: ArrayLike
-) -> tuple[NDArray[float64], NDArray[bool_]]:
-    """Unit rays (N, 3) in the camera frame of pixels (N, 2), and which (N,) pixels have one; the others are NaN."""
+def unproject(lens: str, parameters: ArrayLike, uv: ArrayLike) -> tuple[NDArray[float64], NDArray[bool_]]:
+    """Unit rays (N, 3), camera frame, of pixels (N, 2), and which (N,) pixels have one; the others are NaN."""
 
 def project_features(
     lens: str, parameters: ArrayLike, T_camera_target: ArrayLike, points: ArrayLike, radii: ArrayLike
 ) -> tuple[NDArray[float64], NDArray[bool_]]:
     """Pixels (N, 2) at which features are detected, and which (N,) are wholly in view; the others are NaN.
 
-    A feature is a point (N, 3) of the target's frame with a radius (N,): 0 for a corner, which is seen where it
-    projects to; otherwise a circle whose normal is the target's z axis, seen at the area centroid of its image.
+    A feature is a point (N, 3) of the target's frame with a radius (N,): 0 for a corner, which is seen where
+    it projects to; otherwise a circle whose normal is the target's z axis, seen at the area centroid of its
+    image.
     """
 
 def refine_pose(
@@ -62,12 +62,12 @@ def refine_pose(
     pixels: ArrayLike,
     T_camera_target: ArrayLike,
 ) -> tuple[NDArray[float64], float, NDArray[float64]]:
-    """The pose (4, 4) of a target that fits its pixels (N, 2) best, near a starting one, by Levenberg-Marquardt.
+    """The pose (4, 4) of a target that fits its pixels (N, 2) best, near a starting one.
 
-    Also the root of the mean squared pixel distance over the features, and the information (6, 6) of the left
-    perturbation `[rho; phi]` at a noise of 1 px. Raises `InputError` for fewer than three features or a pixel that is
-    not finite, `DegenerateError` if the features do not determine the pose, and `SolveError` if one is not in view of the
-    starting pose or the iteration does not converge.
+    By Levenberg-Marquardt. Also the root of the mean squared pixel distance over the features, and the
+    information (6, 6) of the left perturbation `[rho; phi]` at a noise of 1 px. Raises `InputError` for fewer
+    than three features or a pixel that is not finite, `DegenerateError` if the features do not determine the
+    pose, and `SolveError` if one is not in view of the starting pose or the iteration does not converge.
     """
 
 # The pose of one view

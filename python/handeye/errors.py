@@ -49,7 +49,7 @@ class HandeyeError(Exception):
 
 
 class InputError(HandeyeError):
-    """The input cannot be used: a wrong shape, a file that is not what it claims, a value out of its range."""
+    """The input cannot be used: a wrong shape, a file that is not what it claims, a value out of range."""
 
     exit_code = ExitCode.UNUSABLE_INPUT
     default_code = "invalid_input"
