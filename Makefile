@@ -9,14 +9,14 @@ STAMPS := $(VENV)/.stamps
 # Public recordings, used by the longer tests and studies when they lie beside the clone.
 ifeq ($(HANDEYE_DATA),)
 ifneq ($(wildcard ../shared/data),)
-export HANDEYE_DATA := $(abspath ../shared/data)
+export HANDEYE_DATA := $(CURDIR)/../shared/data
 endif
 endif
 
 # As in an activated shell: the tools find each other, the build its interpreter.
-export PATH := $(abspath $(BIN)):$(PATH)
-export VIRTUAL_ENV := $(abspath $(VENV))
-export PYO3_PYTHON := $(abspath $(BIN)/python)
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+export VIRTUAL_ENV := $(CURDIR)/$(VENV)
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 RUST_SOURCES := $(shell find crates -type f \( -name '*.rs' -o -name Cargo.toml \))
@@ -102,7 +102,7 @@ clean: ## remove what was built; keep .venv
 	$(say) 'removing build products and caches'
 	@rm -rf target build docs/_build out .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	@rm -f python/handeye/_core*.so python/handeye/_core*.pyd $(STAMPS)/core
-	@find python tests examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	@find python tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## remove .venv too
 	@rm -rf $(VENV)
