@@ -6,6 +6,8 @@ A wrong shape, a parameter out of its range or a transform that is not rigid rai
 `handeye.errors.InputError`.
 """
 
+from typing import TypeAlias
+
 from numpy import bool_, float64
 from numpy.typing import ArrayLike, NDArray
 
@@ -39,10 +41,10 @@ def project(
 def project_jacobians(
     lens: str, parameters: ArrayLike, points_camera: ArrayLike
 ) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[bool_]]:
-    """Pixels (N, 2), derivatives in points (N, 2, 3) and in the n parameters (N, 2, n), which (N,) are seen."""
+    """Pixels (N, 2), derivatives in points (N, 2, 3) and the n parameters (N, 2, n), and which are seen."""
 
 def unproject(lens: str, parameters: ArrayLike, uv: ArrayLike) -> tuple[NDArray[float64], NDArray[bool_]]:
-    """Unit rays (N, 3), camera frame, of pixels (N, 2), and which (N,) pixels have one; the others are NaN."""
+    """Unit rays (N, 3), camera frame, of pixels (N, 2), and which (N,) there are; the others are NaN."""
 
 def project_features(
     lens: str, parameters: ArrayLike, T_camera_target: ArrayLike, points: ArrayLike, radii: ArrayLike
@@ -72,15 +74,15 @@ def refine_pose(
 
 # The pose of one view
 
-type _Fit = tuple[NDArray[float64], float, NDArray[float64]]
+_Fit: TypeAlias = tuple[NDArray[float64], float, NDArray[float64]]
 
 def planar_pose(
     lens: str, parameters: ArrayLike, points: ArrayLike, radii: ArrayLike, pixels: ArrayLike
 ) -> tuple[_Fit, _Fit | None]:
     """Pose of a planar target without a start, and the mirrored second minimum if there is one.
 
-    Each is `T_camera_target` (4, 4), its error in px (root mean square over the points of the residual's norm) and
-    its information (6, 6) at a pixel noise of 1 px.
+    Each is `T_camera_target` (4, 4), its error in px (root mean square over the points of the residual's norm)
+    and its information (6, 6) at a pixel noise of 1 px.
     """
 
 # Least squares
@@ -88,11 +90,11 @@ def planar_pose(
 class Model:
     """Assumptions of a solve; parameters are `xi_x (6), xi_y (6)`, pixel parameters, kinematic parameters.
 
-    `pixel_sigma` (K,): noise of each view in px. `robot_side`: "left" or "right" of A. `robot_roots` (1 or K, 6, 6):
-    square roots of the covariance of the robot's error there. `free_camera`: indices of free camera parameters;
-    `board_scale`: whether the size of the board is free; `pixel_prior`: their prior information, in this order.
-    `kinematic_jacobians` (K, 6, q): `A <- exp(D q) A`; `kinematic_prior` (q, q). `chain_prior`: means X, Y (4, 4)
-    and standard deviations (6,) of their twists.
+    `pixel_sigma` (K,): noise of each view in px. `robot_side`: "left" or "right" of A. `robot_roots`
+    (1 or K, 6, 6): square roots of the covariance of the robot's error there. `free_camera`: indices of free
+    camera parameters; `board_scale`: whether the size of the board is free; `pixel_prior`: their prior
+    information, in this order. `kinematic_jacobians` (K, 6, q): `A <- exp(D q) A`; `kinematic_prior` (q, q).
+    `chain_prior`: means X, Y (4, 4) and standard deviations (6,) of their twists.
     """
 
     def __init__(
@@ -191,7 +193,10 @@ class Solution:
 # Information
 
 class Belief:
-    """Information (n, n) of all global parameters and what follows from it; raises DegenerateError if singular."""
+    """Information (n, n) of all global parameters and what follows from it.
+
+    Raises DegenerateError if it is singular.
+    """
 
     def __init__(self, information: ArrayLike) -> None: ...
     @property
