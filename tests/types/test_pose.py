@@ -1,0 +1,154 @@
+"""Poses against an independent implementation (SciPy) and the laws of the group."""
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from handeye.errors import InputError
+from handeye.types import Pose
+from strategies import plain_values, poses, twists, vectors
+
+GENERIC = Pose.exp([0.3, -0.2, 0.9, 0.4, -1.1, 0.6])
+
+
+def hat(xi: np.ndarray) -> np.ndarray:
+    x, y, z, a, b, c = xi
+    return np.array([[0, -c, b, x], [c, 0, -a, y], [-b, a, 0, z], [0, 0, 0, 0]])
+
+
+@given(twists())
+def test_exp_is_the_matrix_exponential(xi: np.ndarray) -> None:
+    np.testing.assert_allclose(Pose.exp(xi).matrix, expm(hat(xi)), atol=1e-12)
+
+
+@given(twists(angle_rad=0.99 * np.pi))
+def test_log_undoes_exp(xi: np.ndarray) -> None:
+    np.testing.assert_allclose(Pose.exp(xi).log(), xi, atol=1e-9)
+
+
+@given(poses(), poses())
+def test_product_and_inverse_are_those_of_matrices(a: Pose, b: Pose) -> None:
+    np.testing.assert_allclose((a @ b).matrix, a.matrix @ b.matrix, atol=1e-12)
+    np.testing.assert_allclose(a.inverse().matrix, np.linalg.inv(a.matrix), atol=1e-9)
+    assert Pose.identity() == Pose(np.eye(4))
+
+
+@given(poses(), twists(metres=0.5, angle_rad=1.0))
+def test_adjoint_moves_a_perturbation_to_the_left(T: Pose, xi: np.ndarray) -> None:
+    left = Pose.exp(T.adjoint() @ xi) @ T
+    np.testing.assert_allclose(left.matrix, (T @ Pose.exp(xi)).matrix, atol=1e-9)
+
+
+@given(poses(), vectors(3, 2.0))
+def test_act_maps_points(T: Pose, p: np.ndarray) -> None:
+    np.testing.assert_allclose(T.act([p, 2 * p])[1], (T.matrix @ [*(2 * p), 1])[:3], atol=1e-12)
+
+
+@given(poses(angle_rad=np.pi))
+def test_quaternion_agrees_with_scipy_and_reads_back(T: Pose) -> None:
+    q = T.quaternion_xyzw
+    assert q[3] >= 0
+    np.testing.assert_allclose(Rotation.from_quat(q).as_matrix(), T.rotation, atol=1e-9)
+    np.testing.assert_allclose(Pose.from_quaternion(T.translation, q).matrix, T.matrix, atol=1e-9)
+
+
+@given(twists(angle_rad=np.pi))
+def test_rotation_angle(xi: np.ndarray) -> None:
+    assert Pose.exp(xi).rotation_angle_rad == pytest.approx(np.linalg.norm(xi[3:]), abs=1e-7)
+
+
+@given(poses(angle_rad=np.pi))
+def test_copies_are_equal_to_the_last_bit(T: Pose) -> None:
+    for twin in (Pose(T.to_list()), Pose(T.matrix), pickle.loads(pickle.dumps(T)), copy.deepcopy(T)):
+        assert twin == T
+        assert hash(twin) == hash(T)
+
+
+def test_different_poses_differ() -> None:
+    assert Pose.identity() != GENERIC
+    assert "0.3" not in repr(Pose.identity())
+
+
+def test_rounding_of_files_is_repaired() -> None:
+    rounded = np.round(GENERIC.matrix, 5)
+    repaired = Pose(rounded)
+    np.testing.assert_allclose(repaired.rotation.T @ repaired.rotation, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(repaired.matrix, GENERIC.matrix, atol=2e-5)
+
+
+def test_arrays_are_frozen_and_independent() -> None:
+    source = np.eye(4)
+    pose = Pose(source)
+    source[0, 3] = 5
+    assert pose.translation[0] == 0
+    for array in (
+        pose.matrix,
+        pose.rotation,
+        pose.translation,
+        (pose @ pose).matrix,
+        pose.inverse().matrix,
+        np.asarray(pose),
+    ):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+    own = np.array(pose)
+    own[0, 0] = 7
+    assert pose.matrix[0, 0] == 1
+
+
+def test_a_pose_does_not_mix_with_arrays() -> None:
+    left: Any = GENERIC
+    for mix in (lambda: left @ np.eye(4), lambda: np.eye(4) @ left, lambda: left @ 2):
+        with pytest.raises(TypeError):
+            mix()
+
+
+@pytest.mark.parametrize(
+    ("matrix", "code"),
+    [
+        (np.diag([1.0, 1.0, 1.001, 1.0]), "not_rigid"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "not_rigid"),
+        (np.diag([1.0, 1.0, 1.0, 2.0]), "not_rigid"),
+        (np.eye(4) + 0.01 * np.eye(4, k=1), "not_rigid"),
+        (np.zeros((4, 4)), "not_rigid"),
+        (np.full((4, 4), 1e308), "not_rigid"),
+        (np.full((4, 4), np.nan), "not_finite"),
+        (np.where(np.eye(4, k=3) > 0, np.inf, np.eye(4)), "not_finite"),
+        (np.eye(3), "wrong_shape"),
+        (np.eye(4).ravel(), "wrong_shape"),
+        (np.eye(4) * 1j, "not_numbers"),
+        ([["1", "0", "0", "0"]] * 4, "not_numbers"),
+        ([[1, 2], [3]], "not_numbers"),
+        (None, "not_numbers"),
+    ],
+)
+def test_what_is_no_rigid_transform_is_refused(matrix: Any, code: str) -> None:
+    with pytest.raises(InputError) as caught:
+        Pose(matrix)
+    assert caught.value.code == code
+
+
+@pytest.mark.parametrize(
+    "quaternion", [[0, 0, 0, 0], [0, 0, 0, 1.01], [0, 0, 0, np.nan], [0, 0, 1], [1, 1, 1, 1]]
+)
+def test_bad_quaternions_are_refused(quaternion: list[float]) -> None:
+    with pytest.raises(InputError):
+        Pose.from_quaternion([0, 0, 0], quaternion)
+
+
+def test_written_quaternions_are_normalised() -> None:
+    pose = Pose.from_quaternion([1, 2, 3], [0, 0, 0.7071, 0.7071])
+    np.testing.assert_allclose(pose.rotation, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+
+
+@given(plain_values())
+def test_hostile_values_raise_only_our_error(value: Any) -> None:
+    for construct in (Pose, Pose.exp, lambda v: Pose.from_quaternion([0, 0, 0], v)):
+        with pytest.raises(InputError):
+            construct(value)
