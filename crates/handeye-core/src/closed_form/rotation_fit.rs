@@ -1,0 +1,72 @@
+//! The rotation that best maps one list of vectors to another.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::linear::{RANK_TOLERANCE, singular};
+use crate::error::Error;
+
+/// Singular values and vectors of `sum p q'`, third vectors completed to right-handed bases.
+pub(super) struct Correlation {
+    /// Falling, the third with the sign of the determinant.
+    pub values: Vector3<f64>,
+    /// A rotation whose columns are the directions of the `p`.
+    pub left: Matrix3<f64>,
+    /// A rotation whose columns are the directions of the `q`.
+    pub right: Matrix3<f64>,
+}
+
+impl Correlation {
+    /// # Errors
+    /// [`Error::Numerical`] if an entry is not finite.
+    pub fn of(sum: &Matrix3<f64>) -> Result<Self, Error> {
+        let svd = singular(&DMatrix::from_column_slice(3, 3, sum.as_slice()))?;
+        let basis = |m: &DMatrix<f64>| {
+            let (first, second) = (m.fixed_view::<3, 1>(0, 0), m.fixed_view::<3, 1>(0, 1));
+            Matrix3::from_columns(&[first.into_owned(), second.into_owned(), first.cross(&second)])
+        };
+        let (left, right) = (basis(&svd.left), basis(&svd.right));
+        let third = left.column(2).dot(&(sum * right.column(2)));
+        Ok(Self { values: Vector3::new(svd.values[0], svd.values[1], third), left, right })
+    }
+
+    /// `s2 + sign(det) s3`: positive exactly if one rotation maps the `q` to the `p` best.
+    pub fn uniqueness(&self) -> f64 {
+        self.values[1] + self.values[2]
+    }
+}
+
+/// The rotation `R` that minimises `sum |p - R q|^2`, given `sum p q'` (Kabsch 1978; Umeyama 1991, lemma).
+///
+/// Never a reflection, also where the third singular value is nothing but noise (three views, small
+/// rotations).
+///
+/// # Errors
+/// [`Error::Degenerate`] if the vectors lie on one line, [`Error::Numerical`] if an entry is not finite.
+pub(super) fn rotation_from_correlation(sum: &Matrix3<f64>) -> Result<Matrix3<f64>, Error> {
+    let correlation = Correlation::of(sum)?;
+    if correlation.uniqueness() <= RANK_TOLERANCE * correlation.values[0] {
+        let [first, second, third] = correlation.values.into();
+        return Err(Error::degenerate(format!(
+            "these views do not determine a rotation: singular values {second:.1e} and {third:.1e} against \
+             {first:.1e}"
+        )));
+    }
+    Ok(correlation.left * correlation.right.transpose())
+}
+
+/// The rotation nearest to a matrix that is a rotation times a scale of either sign: `sign(det M) / |det
+/// M|^(1/3) M`, then made orthogonal (Andreff et al. 1999, eq. 15).
+///
+/// # Errors
+/// [`Error::Numerical`] if the matrix is too near to singular to be meant as a rotation.
+pub(super) fn rotation_of_either_sign(m: &Matrix3<f64>) -> Result<Matrix3<f64>, Error> {
+    let determinant = m.determinant();
+    let size = m.norm();
+    // Of a scaled rotation the determinant is (size / sqrt 3)^3.
+    if size.is_nan() || determinant.abs() <= RANK_TOLERANCE * size.powi(3) {
+        return Err(Error::numerical(format!(
+            "the linear solution is no rotation: determinant {determinant:.1e} at size {size:.1e}"
+        )));
+    }
+    rotation_from_correlation(&(m * determinant.signum()))
+}
