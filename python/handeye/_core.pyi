@@ -81,9 +81,23 @@ def planar_pose(
 ) -> tuple[_Fit, _Fit | None]:
     """Pose of a planar target without a start, and the mirrored second minimum if there is one.
 
-    Each is `T_camera_target` (4, 4), its error in px (root mean square over the points of the residual's norm)
+    Each is `T_camera_target` (4, 4), its error in px (root mean square over the points of the residual)
     and its information (6, 6) at a pixel noise of 1 px.
     """
+
+# Closed-form starts
+
+def closed_form(method: str, A: ArrayLike, C: ArrayLike) -> tuple[NDArray[float64], NDArray[float64]]:
+    """X and Y (4, 4) of `C[k] = X @ A[k] @ Y` for A and C (K, 4, 4), K >= 3.
+
+    Eye in hand: X = T_camera_flange, A = T_flange_base, Y = T_base_target; eye to hand: X = T_camera_base,
+    A = T_base_flange, Y = T_flange_target; C = T_camera_target. Raises InputError for an unknown method,
+    lists of different length or too few views, DegenerateError where the views do not rotate about two axes
+    and SolveError where the method fails although an answer exists.
+    """
+
+def closed_form_methods() -> list[tuple[str, str, str]]:
+    """Name, family ("AX = XB" or "AX = YB") and paper of every method."""
 
 # Least squares
 

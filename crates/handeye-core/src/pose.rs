@@ -204,7 +204,9 @@ mod tests {
             let random = &mut Random::new(seed);
             let (camera, features, truth) = (camera(), grid(0.008), pose(random));
             let mut pixels = seen(&camera, &features, &truth);
-            pixels.iter_mut().for_each(|p| *p += Vector2::new(random.normal(), random.normal()) * 0.2);
+            for pixel in &mut pixels {
+                *pixel += Vector2::new(random.normal(), random.normal()) * 0.2;
+            }
             let fit = refine_pose(&camera, &features, &pixels, &truth).unwrap();
             let stacked = numerical_jacobian::<48, 6>(&Vector6::zeros(), |xi| {
                 let predicted = seen(&camera, &features, &(Se3::exp(xi) * fit.t_camera_target));

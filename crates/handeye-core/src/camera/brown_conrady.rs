@@ -92,9 +92,13 @@ pub(super) fn coefficients<const COUNT: usize>(p: &Parameters, x: f64, y: f64, o
     }
 }
 
-/// Squared radius up to which the radial mapping `r N/D` rises and `D` is positive.
+/// Squared radius of a disc on which the lens is one-to-one.
 ///
-/// `d/dr (r N/D) = (N D + 2 s (N' D - N D')) / D^2`, so it rises up to the first root of that numerator.
+/// The radial mapping `r N/D` rises up to the first root of `N D + 2 s (N' D - N D')`, where `D` is positive. The
+/// Jacobian of the radial part is symmetric with eigenvalues `N/D` across and `d/dr (r N/D)` along the radius; those
+/// of decentring and prism have a spectral norm of at most `r (6 |(p1, p2)| + 2 |(s1, s3)| + 4 s |(s2, s4)|)`. Where
+/// that stays below both eigenvalues the sum is positive definite, and a map whose Jacobian is so on a convex region
+/// is one-to-one there.
 pub(super) fn max_squared_radius(p: &Parameters) -> f64 {
     let (n, d) = fraction(p);
     let mut rising = [0.0; 7];
@@ -105,7 +109,25 @@ pub(super) fn max_squared_radius(p: &Parameters) -> f64 {
     }
     let fold = region::first_root(&rising, MAX_SQUARED_RADIUS);
     let pole = region::first_root(&d, MAX_SQUARED_RADIUS);
-    fold.min(pole)
+    let radial = fold.min(pole);
+    let first = 6.0 * p[6].hypot(p[7]) + 2.0 * p[12].hypot(p[14]);
+    let third = 4.0 * p[13].hypot(p[15]);
+    if first == 0.0 && third == 0.0 {
+        return radial;
+    }
+    let margin = |r: f64| {
+        let (across, along) = radial_factors(&n, &d, r * r);
+        across.min(along) - r * (first + r * r * third)
+    };
+    region::first_nonpositive(radial.sqrt(), margin).powi(2)
+}
+
+/// `N/D` and `d/dr (r N/D)` at a squared radius: how much the radial part stretches across and along the radius.
+fn radial_factors(n: &[f64; 4], d: &[f64; 4], s: f64) -> (f64, f64) {
+    let denominator = region::value(d, s);
+    let across = region::value(n, s) / denominator;
+    let slope = (region::derivative(n, s) - across * region::derivative(d, s)) / denominator;
+    (across, across + 2.0 * s * slope)
 }
 
 /// The point before the lens if it were purely radial: the start for Newton's method.
@@ -116,11 +138,8 @@ pub(super) fn straighten_radially(p: &Parameters, max_squared_radius: f64, u: f6
     }
     let (n, d) = fraction(p);
     let radius = region::rising_root(target, max_squared_radius.sqrt(), |r| {
-        let s = r * r;
-        let denominator = region::value(&d, s);
-        let radial = region::value(&n, s) / denominator;
-        let slope = (region::derivative(&n, s) - radial * region::derivative(&d, s)) / denominator;
-        (r * radial, radial + 2.0 * s * slope)
+        let (across, along) = radial_factors(&n, &d, r * r);
+        (r * across, along)
     });
     (u * radius / target, v * radius / target)
 }

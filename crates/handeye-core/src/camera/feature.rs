@@ -104,7 +104,7 @@ impl Camera {
         let [x, y] = ellipse.centre;
         let middle = self.bend(x, y)?;
         if self.lens == Lens::Pinhole {
-            return Some(self.to_pixel(x, y));
+            return Some(self.scale_and_shift(x, y));
         }
         let mut boundary = Boundary::default();
         for (i, at) in ellipse.boundary().iter().enumerate() {
@@ -113,7 +113,7 @@ impl Camera {
             boundary.y[i] = bent.y - middle.y;
         }
         let (centroid, _) = boundary.centroid();
-        Some(self.to_pixel(middle.x + centroid.x, middle.y + centroid.y))
+        Some(self.scale_and_shift(middle.x + centroid.x, middle.y + centroid.y))
     }
 
     /// `d_parameters`, where wanted, starts as zero.
@@ -169,7 +169,7 @@ impl Camera {
         let mut d_twist = Matrix2x6::zeros();
         d_twist.set_row(0, &(ellipse.pull_back(&d_x) * self.parameters[0]).transpose());
         d_twist.set_row(1, &(ellipse.pull_back(&d_y) * self.parameters[1]).transpose());
-        Some((self.to_pixel(centroid.x, centroid.y), d_twist))
+        Some((self.scale_and_shift(centroid.x, centroid.y), d_twist))
     }
 }
 

@@ -170,7 +170,9 @@ impl Camera {
     /// As [`Camera::new`].
     pub fn plus(&self, delta: &[f64]) -> Result<Self, Error> {
         let mut parameters = self.parameters;
-        parameters.iter_mut().zip(delta).for_each(|(p, d)| *p += d);
+        for (parameter, change) in parameters.iter_mut().zip(delta) {
+            *parameter += change;
+        }
         Self::new(self.lens, &parameters[..self.lens.parameter_count()])
     }
 
@@ -187,7 +189,7 @@ impl Camera {
                 Lens::BrownConrady12 => brown_conrady::bend::<true, true>(p, x, y),
                 Lens::KannalaBrandt => kannala_brandt::bend(p, x, y),
             };
-            // The radius covers the radial part; decentring and prism can fold the plane a little earlier.
+            // On the very edge rounding can make it singular, next to a pole NaN.
             if bent.jacobian.determinant() > 0.0 {
                 return Some(bent);
             }
@@ -211,7 +213,7 @@ impl Camera {
 
     /// Focal lengths and principal point applied to a point after the lens.
     #[inline]
-    fn to_pixel(&self, x: f64, y: f64) -> Vector2<f64> {
+    fn scale_and_shift(&self, x: f64, y: f64) -> Vector2<f64> {
         let p = &self.parameters;
         Vector2::new(p[0] * x + p[2], p[1] * y + p[3])
     }
@@ -235,7 +237,7 @@ impl Camera {
     pub fn project(&self, point: &Vector3<f64>) -> Option<Vector2<f64>> {
         let (x, y, _) = at_unit_depth(point)?;
         let bent = self.bend(x, y)?;
-        Some(self.to_pixel(bent.x, bent.y))
+        Some(self.scale_and_shift(bent.x, bent.y))
     }
 
     /// Pixel and its derivative in the point.
@@ -246,7 +248,10 @@ impl Camera {
     ) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let (x, y, inverse_depth) = at_unit_depth(point)?;
         let bent = self.bend(x, y)?;
-        Some((self.to_pixel(bent.x, bent.y), self.point_derivative(x, y, inverse_depth, &bent.jacobian)))
+        Some((
+            self.scale_and_shift(bent.x, bent.y),
+            self.point_derivative(x, y, inverse_depth, &bent.jacobian),
+        ))
     }
 
     /// Pixel and its derivatives in the point and in the camera parameters.
@@ -258,7 +263,7 @@ impl Camera {
         self.bend_coefficients(x, y, &mut d_parameters);
         self.finish_parameters(bent.x, bent.y, &mut d_parameters);
         Some(Projection {
-            pixel: self.to_pixel(bent.x, bent.y),
+            pixel: self.scale_and_shift(bent.x, bent.y),
             d_point: self.point_derivative(x, y, inverse_depth, &bent.jacobian),
             d_parameters,
         })
@@ -284,7 +289,7 @@ impl Camera {
             Lens::KannalaBrandt => kannala_brandt::straighten(p, self.max_squared_radius, u, v)?,
             _ => {
                 let start = brown_conrady::straighten_radially(p, self.max_squared_radius, u, v);
-                region::newton(start, (u, v), |x, y| self.bend(x, y))?
+                region::straighten(start, (u, v), |x, y| self.bend(x, y))?
             }
         };
         let norm_squared = x * x + y * y;

@@ -61,6 +61,34 @@ fn sign_changes(coefficients: &[f64], upper: f64) -> ([f64; MAX_DEGREE], usize) 
     roots
 }
 
+/// The first place in `(0, upper]` where a function, positive at zero, is not; else `upper`.
+///
+/// Looked for at places that are dense near zero, then by bisection; a shorter dip is missed.
+pub(super) fn first_nonpositive(upper: f64, function: impl Fn(f64) -> f64) -> f64 {
+    const PLACES: usize = 64;
+    let mut before = 0.0;
+    for i in 1..=PLACES {
+        let t = i as f64 / PLACES as f64;
+        let at = t / (1.0 - t + t / upper);
+        // NaN (a pole) is not positive either.
+        if function(at) > 0.0 {
+            before = at;
+            continue;
+        }
+        let mut beyond = at;
+        for _ in 0..50 {
+            let middle = 0.5 * (before + beyond);
+            if function(middle) > 0.0 {
+                before = middle;
+            } else {
+                beyond = middle;
+            }
+        }
+        return before;
+    }
+    upper
+}
+
 /// The argument in `[0, upper]` where a rising function of value and slope reaches `target`; else the nearer end.
 pub(super) fn rising_root(target: f64, upper: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
     rising_between(target, 0.0, upper, function)
@@ -90,21 +118,40 @@ fn rising_between(target: f64, lower: f64, upper: f64, function: impl Fn(f64) ->
     at
 }
 
-/// Solves `lens(x, y) = target` by Newton's method with halved steps, staying where the lens is valid.
-pub(super) fn newton(
+/// Solves `lens(x, y) = target` from a start near the answer, staying where the lens is valid.
+///
+/// Where that fails (strong decentring next to a fold) the answer is followed from the axis outwards instead.
+pub(super) fn straighten(
     start: (f64, f64),
     target: (f64, f64),
     lens: impl Fn(f64, f64) -> Option<Bent>,
 ) -> Option<(f64, f64)> {
+    const STAGES: usize = 32;
     let target = Vector2::new(target.0, target.1);
+    let found = newton(Vector2::new(start.0, start.1), &target, &lens).or_else(|| {
+        let axis = lens(0.0, 0.0)?;
+        let axis = Vector2::new(axis.x, axis.y);
+        (1..=STAGES).try_fold(Vector2::zeros(), |at, stage| {
+            let waypoint = axis.lerp(&target, stage as f64 / STAGES as f64);
+            newton(at, &waypoint, &lens)
+        })
+    })?;
+    Some((found.x, found.y))
+}
+
+/// Newton's method with halved steps; None where it does not reach the target.
+fn newton(
+    start: Vector2<f64>,
+    target: &Vector2<f64>,
+    lens: impl Fn(f64, f64) -> Option<Bent>,
+) -> Option<Vector2<f64>> {
     let miss = |at: &Vector2<f64>| lens(at.x, at.y).map(|b| (Vector2::new(b.x, b.y) - target, b.jacobian));
-    // The start may lie on the very edge of the region.
-    let mut at = Vector2::new(start.0, start.1);
+    let mut at = start;
     let (mut residual, mut jacobian) = miss(&at).or_else(|| {
+        // The start may lie on the very edge of the region.
         at *= 1.0 - 1e-6;
         miss(&at)
     })?;
-    let tolerance = 1e-13 * (1.0 + target.norm());
     for _ in 0..50 {
         let norm = residual.norm();
         let step = jacobian.try_inverse()? * residual;
@@ -117,10 +164,8 @@ pub(super) fn newton(
                 _ => break None,
             }
         };
-        let Some((trial, r, j)) = better else {
-            break;
-        };
-        (at, residual, jacobian) = (trial, r, j);
+        let Some(next) = better else { break };
+        (at, residual, jacobian) = next;
     }
-    (residual.norm() <= tolerance).then_some((at.x, at.y))
+    (residual.norm() <= 1e-13 * (1.0 + target.norm())).then_some(at)
 }
