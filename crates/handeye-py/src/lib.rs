@@ -5,6 +5,7 @@
 use pyo3::prelude::*;
 
 mod camera;
+mod closed_form;
 mod convert;
 mod errors;
 mod geometry;
@@ -16,6 +17,7 @@ mod problem;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     camera::register(module)?;
+    closed_form::register(module)?;
     geometry::register(module)?;
     planar_pose::register(module)?;
     problem::register(module)?;

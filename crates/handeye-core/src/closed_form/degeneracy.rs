@@ -23,8 +23,8 @@ pub const MIN_SPREAD_RAD: f64 = 2e-3;
 
 /// The spread must exceed the noise of the rotation angles by this factor.
 ///
-/// What it does, by simulation (5,000 sets each). Parallel axes that noise of 1 mrad in the hand and 3 mrad in
-/// the eye makes look different: 0.9 % of sets of three views pass, 0.2 % of four, 0.02 % of eight; a hand
+/// What it does, by simulation (5,000 sets each). Parallel axes that noise of 1 mrad in the hand and 3 mrad
+/// in the eye makes look different: 0.9 % of sets of three views pass, 0.2 % of four, 0.02 % of eight; a hand
 /// without noise lets none pass. Legitimate sets of three views, noise 1 mrad in the eye, turned about random
 /// axes: 7 % are refused at up to 3 degrees, 2 % at 5, 0.8 % at 10; of five views at 3 degrees 0.04 %.
 pub const NOISE_FACTOR: f64 = 3.0;
