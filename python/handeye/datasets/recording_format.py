@@ -296,15 +296,18 @@ def _update(recording: Recording, folder: Path, images_from: Path | None) -> Non
             f"{folder}: not replaced, as it holds no recording that can be read: {error}", code="exists"
         ) from error
     written: list[Path] = []
+    text = b""
     try:
         (folder / "corners").mkdir(exist_ok=True)
         tables = [
             _updated_view(view, old.get(view.name), folder, images_from, written) for view in recording.views
         ]
-        replace_file(folder / FILE_NAME, _text(recording, tables))
+        text = _text(recording, tables)
+        replace_file(folder / FILE_NAME, text)
     except BaseException as error:
-        for path in written:
-            path.unlink(missing_ok=True)
+        if not _is_current(folder, text):
+            for path in written:
+                path.unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise OutputError(f"{folder}: cannot be written ({error})") from error
         raise
@@ -312,6 +315,14 @@ def _update(recording: Recording, folder: Path, images_from: Path | None) -> Non
     for view in old.values():
         if view.corners not in kept:
             _remove_corners(folder, view.corners)
+
+
+def _is_current(folder: Path, text: bytes) -> bool:
+    """Tell whether the step is done: an interruption may come right after it."""
+    try:
+        return read_text(folder / FILE_NAME, MAX_BYTES).encode() == text
+    except InputError:
+        return True  # in doubt, what lies around does no harm
 
 
 def _updated_view(

@@ -138,7 +138,7 @@ def _shot(entry: _Entry, name: str, file: Path) -> Shot:
 
 
 def _names(entries: list[_Entry]) -> list[str]:
-    """Return a name for each view: that of its image, with a number where two folders hold images of one name."""
+    """Return the names of the views: those of the images, numbered where two images have one name."""
     stems = [re.sub(r"[^A-Za-z0-9_.-]", "_", Path(entry.image).stem)[:80] for entry in entries]
     if len({stem.lower() for stem in stems}) == len(stems):
         return stems

@@ -4,11 +4,12 @@ A new folder is filled beside its place under another name and then renamed; a f
 Every file is on the disk before it gets its name. Whatever the system refuses becomes an `OutputError`.
 """
 
+import errno
 import os
 import secrets
 import shutil
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from handeye.datasets.reading import reason
@@ -41,10 +42,10 @@ def new_folder(folder: Path) -> Generator[Path]:
             if folder.is_dir():
                 folder.rmdir()  # empty, as checked above; a rename onto it is not possible on every system
             partial.rename(folder)
-            _sync_folder(folder.parent)
         except BaseException:
             shutil.rmtree(partial, ignore_errors=True)
             raise
+        _hasten(folder.parent)
 
 
 def is_occupied(folder: Path) -> bool:
@@ -68,10 +69,10 @@ def replace_file(path: Path, content: bytes) -> None:
         try:
             _write(partial, content)
             partial.replace(path)
-            _sync_folder(path.parent)
         except BaseException:
             partial.unlink(missing_ok=True)
             raise
+        _hasten(path.parent)
 
 
 def write_file(path: Path, content: bytes) -> None:
@@ -137,8 +138,17 @@ def _sync_folder(folder: Path) -> None:
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in {errno.EINVAL, errno.ENOTSUP}:  # some file systems know no such thing
+            raise
     finally:
         os.close(descriptor)
+
+
+def _hasten(folder: Path) -> None:
+    """Bring a new name to the disk soon; whole it is already, so a refusal is no failure."""
+    with suppress(OSError):
+        _sync_folder(folder)
 
 
 @contextmanager

@@ -105,7 +105,7 @@ def _numbers(values: ArrayLike, what: str) -> NDArray[np.generic]:
     try:
         return np.asarray(values)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise InputError(f"{what}: not an array of numbers ({error})", code="not_numbers") from error
+        raise InputError(f"{what}: not numbers, or rows of different length", code="not_numbers") from error
 
 
 def _check_shape(found: tuple[int, ...], expected: tuple[int | None, ...], what: str) -> None:

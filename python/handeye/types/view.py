@@ -124,17 +124,17 @@ class View:
         if not isinstance(T_base_flange, Pose):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError(f"{where}: T_base_flange is no Pose but {type(T_base_flange).__name__}")
         ids = index_array(point_ids, f"{where}: point_ids")
-        values = finite_array(pixels, (None, 2), f"{where}: pixels")
-        if len(ids) != len(values):
-            raise InputError(
-                f"{where}: {len(ids)} point ids but {len(values)} pixels, expected as many",
-                code="wrong_shape",
-            )
         if len(ids) == 0:
             raise InputError(
                 f"{where}: no points",
                 code="no_points",
                 hint="leave out views in which the target was not found",
+            )
+        values = finite_array(pixels, (None, 2), f"{where}: pixels")
+        if len(ids) != len(values):
+            raise InputError(
+                f"{where}: {len(ids)} point ids but {len(values)} pixels, expected as many",
+                code="wrong_shape",
             )
         unique, counts = np.unique(ids, return_counts=True)
         if len(unique) < len(ids):
