@@ -6,6 +6,7 @@
 pub mod camera;
 pub mod closed_form;
 pub mod error;
+pub mod evidence;
 pub mod information;
 pub mod least_squares;
 pub mod planar_pose;

@@ -15,7 +15,6 @@ fn class_and_code(error: &Error) -> (&'static str, &'static str) {
 }
 
 /// The Python exception for a core error.
-#[expect(clippy::needless_pass_by_value, reason = "the shape that map_err wants")]
 pub fn to_python(py: Python<'_>, error: Error) -> PyErr {
     let (class, code) = class_and_code(&error);
     raise(py, class, code, &error.to_string())

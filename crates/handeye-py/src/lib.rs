@@ -2,12 +2,15 @@
 //!
 //! Nothing is decided here. Each file registers its own functions.
 
+#![allow(clippy::needless_pass_by_value, reason = "what Python calls takes its arguments by value")]
+
 use pyo3::prelude::*;
 
 mod camera;
 mod closed_form;
 mod convert;
 mod errors;
+mod evidence;
 mod geometry;
 mod information;
 mod model;
@@ -18,6 +21,7 @@ mod problem;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     camera::register(module)?;
     closed_form::register(module)?;
+    evidence::register(module)?;
     geometry::register(module)?;
     planar_pose::register(module)?;
     problem::register(module)?;

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 use crate::convert::{self, Array};
 use crate::errors::to_python;
-use crate::problem::{camera, features};
+use crate::camera::{camera, features};
 
 /// Registers the functions of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
