@@ -4,8 +4,6 @@
 
 #![allow(clippy::needless_pass_by_value, reason = "what Python calls takes its arguments by value")]
 
-#![allow(clippy::needless_pass_by_value, reason = "what Python calls takes its arguments by value")]
-
 use pyo3::prelude::*;
 
 mod camera;
