@@ -16,6 +16,8 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("handeye")
+# A longer search with new examples every time: pytest --hypothesis-profile=search
+settings.register_profile("search", settings.get_profile("handeye"), derandomize=False, max_examples=3000)
 
 
 @pytest.fixture(scope="session")

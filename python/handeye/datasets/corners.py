@@ -9,7 +9,7 @@ from handeye.types import View
 from handeye.types.target.base import MAX_POINTS
 
 HEADER = "id,u_px,v_px"
-MAX_BYTES = 16 * MIB
+MAX_BYTES = 8 * MIB
 _ID = re.compile(r"\d{1,9}", re.ASCII)
 
 

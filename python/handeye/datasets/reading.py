@@ -16,6 +16,7 @@ from handeye.types.view import check_relative_path
 
 MIB = 1 << 20
 MAX_FOLDER_ENTRIES = 100_000
+MAX_DIGITS = 400
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # Opening a pipe must not wait for a writer, and text must come as it is.
@@ -159,7 +160,7 @@ def number(text: str, where: str) -> float:
         Not a number, NaN or infinite.
     """
     text = text.strip()
-    value = float(text) if _NUMBER.fullmatch(text) else None
+    value = float(text) if len(text) <= MAX_DIGITS and _NUMBER.fullmatch(text) else None
     if value is None or value in {float("inf"), float("-inf")}:
         raise InputError(
             f"{where}: {text[:40]!r}, expected a finite number",

@@ -2,7 +2,8 @@
 
 ::
 
-    recording.toml      format, version, name, source, mounting, [camera], [target], [truth], [[view]] ...
+    recording.toml      format, version, name, source, mounting, view_count, [camera], [target], [truth],
+                        [[view]] ...
     corners/NAME.csv    id,u_px,v_px
     images/NAME.png     optional
 
@@ -30,8 +31,9 @@ from handeye.types.view import check_view_name
 FORMAT = "handeye-recording"
 VERSION = 1
 FILE_NAME = "recording.toml"
-MAX_BYTES = 32 * MIB
-MAX_VIEWS = 100_000
+MAX_BYTES = 4 * MIB
+# A key of very many parts, a.a.a..., takes the reader of TOML hours; no line of ours has nearly as many dots.
+MAX_DOTS_IN_LINE = 300
 
 Rows = list[list[float]]
 
@@ -54,6 +56,7 @@ class _RecordingDocument(Document):
     target: dict[str, Any]
     source: str = ""
     truth: dict[str, Rows] | None = None
+    view_count: int | None = None
     view: list[_ViewDocument] = []  # noqa: RUF012 - msgspec copies an empty default
 
 
@@ -94,8 +97,12 @@ def read_recording(folder: str | os.PathLike[str]) -> LoadedRecording:
     file = root / FILE_NAME
     document = _read_document(file)
     with located(str(file)):
-        if len(document.view) > MAX_VIEWS:
-            raise InputError(f"{len(document.view)} views, expected at most {MAX_VIEWS}", code="too_large")
+        if document.view_count not in {None, len(document.view)}:
+            raise InputError(
+                f"{len(document.view)} views, but view_count is {document.view_count}",
+                code="truncated",
+                hint="the file may have been cut off; if it was edited on purpose, correct view_count",
+            )
         camera = Camera.from_dict(document.camera)
         recording = Recording(
             name=document.name,
@@ -149,6 +156,8 @@ def write_recording(
 
 def _read_document(file: Path) -> _RecordingDocument:
     text = read_text(file, MAX_BYTES)
+    if any(line.count(".") > MAX_DOTS_IN_LINE for line in text.split("\n")):
+        raise InputError(f"{file}: a line with more than {MAX_DOTS_IN_LINE} dots", code="not_toml")
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -227,6 +236,7 @@ def _text(recording: Recording, tables: list[dict[str, Any]]) -> bytes:
         name=recording.name,
         source=recording.source,
         mounting=mounting.value,
+        view_count=len(tables),
         camera=recording.camera.to_dict(),
         target=recording.target.to_dict(),
         truth={name: pose.to_list() for name, pose in poses.items() if pose is not None} or None,

@@ -15,7 +15,7 @@ from handeye.types.view import View
 # How far outside the image a point may lie, as a share of the longer side: room for an extrapolated corner.
 OUTSIDE_SHARE = 0.05
 MAX_NAME_LENGTH = 200
-MAX_SOURCE_LENGTH = 4000
+MAX_SOURCE_LENGTH = 2000
 
 
 class _TruthDocument(Document):

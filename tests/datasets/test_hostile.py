@@ -1,0 +1,107 @@
+"""Files of strangers: whatever they hold, the caller sees our errors and no others."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from datasets.layouts import RCT_FILES, some_recording, write_rct, write_rwhe
+from handeye.datasets import load, read_poses_csv, read_recording, write_recording
+from handeye.errors import InputError
+from strategies import mutated
+
+WORDS = [
+    b"version = 2",
+    b"[[view]]\n",
+    b"= [[[[",
+    b"&a [*a, *a]",
+    b"!!int ''",
+    b"\n- ",
+    b"id,u_px,v_px\n",
+    b"1:30:00",
+]
+EXAMPLES = settings(max_examples=3 * settings().max_examples)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("hostile") / "rec"
+    write_recording(some_recording(2), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def rwhe(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_rwhe(tmp_path_factory.mktemp("hostile") / "rwhe", 2)
+
+
+@pytest.fixture(scope="module")
+def rct(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_rct(tmp_path_factory.mktemp("hostile") / "rct")
+
+
+def attack(data: st.DataObject, folder: Path, names: list[str], **options: object) -> None:
+    """Load a folder with one file mutated or replaced; then put it back."""
+    path = folder / data.draw(st.sampled_from(names))
+    original = path.read_bytes()
+    path.write_bytes(data.draw(mutated(original, WORDS) | st.binary(max_size=300)))
+    try:
+        load(folder, **options)  # type: ignore[arg-type]
+    except InputError:
+        pass
+    finally:
+        path.write_bytes(original)
+
+
+@EXAMPLES
+@given(st.data())
+def test_recordings(recording: Path, data: st.DataObject) -> None:
+    attack(data, recording, ["recording.toml", "recording.toml", "corners/im_0.csv"])
+
+
+@EXAMPLES
+@given(st.data())
+def test_rwhe_calib(rwhe: Path, data: st.DataObject) -> None:
+    names = ["RobotPosesVec.txt", "square size.txt", "GroundTruth.txt", "im_8.png"]
+    attack(data, rwhe, names, pattern=(3, 4))
+
+
+@EXAMPLES
+@given(st.data())
+def test_robot_cal_tools(rct: Path, data: st.DataObject) -> None:
+    attack(data, rct, list(RCT_FILES))
+
+
+@EXAMPLES
+@given(st.data())
+def test_poses(tmp_path: Path, data: st.DataObject) -> None:
+    path = tmp_path / "poses.csv"
+    good = b"name,x,y,z,qx,qy,qz,qw\na,1,2,3,0,0,0,1\nb,0.1,0.2,0.3,0.6,0,0,0.8\n"
+    path.write_bytes(data.draw(mutated(good, WORDS) | st.binary(max_size=300)))
+    try:
+        table = read_poses_csv(path)
+    except InputError:
+        return
+    assert len(table.names) == len(table.poses) > 0
+
+
+def test_every_truncation_of_a_recording_is_noticed(recording: Path) -> None:
+    path = recording / "recording.toml"
+    original = path.read_text()
+    try:
+        for length in range(0, len(original) - 1, 7):
+            path.write_text(original[:length])
+            with pytest.raises(InputError):
+                read_recording(recording)
+    finally:
+        path.write_text(original)
+
+
+@given(st.text(max_size=60))
+def test_paths(tmp_path: Path, text: str) -> None:
+    for path in (text, tmp_path / text):
+        try:
+            load(path)
+        except InputError:
+            continue
