@@ -263,3 +263,70 @@ class Predictor:
 
     def informations(self, motions: ArrayLike) -> NDArray[float64]:
         """Information (N, n, n) of each candidate; zero where too little would be in sight."""
+
+# Evidence
+
+def start_from_poses(
+    motions: ArrayLike,
+    poses: ArrayLike,
+    covariances: ArrayLike,
+    *,
+    start: tuple[ArrayLike, ArrayLike] | None = None,
+    prior_sigma_m: float = 1.0,
+) -> tuple[NDArray[float64], NDArray[float64], float, str]:
+    """X, Y, cost and origin that fit `poses[k] ~ X motions[k] Y` (K, 4, 4) from many starts, with a weak prior."""
+
+class Compressed:
+    """Views of a problem, each reduced to the pose of its own image with that pose's information."""
+
+    def __init__(
+        self, problem: Problem, poses: ArrayLike, *, free_camera: list[int] | None = None
+    ) -> None: ...
+    @property
+    def variances_px2(self) -> list[float]: ...
+    @property
+    def covariances(self) -> NDArray[float64]: ...
+    def shrunk_variances(
+        self, views: list[int] | None = None, *, prior_degrees: float = 20.0, floor_px2: float = 1e-8
+    ) -> list[float]: ...
+    def estimate(
+        self,
+        *,
+        views: list[int] | None = None,
+        camera_prior: ArrayLike | None = None,
+        start: tuple[ArrayLike, ArrayLike] | None = None,
+        prior_sigma_m: float = 1.0,
+        exact_probability: float = ...,
+        sides: list[str] | None = None,
+        levels: tuple[float, float] | None = None,
+        prior_degrees: float = 20.0,
+        floor_px2: float = 1e-8,
+        linearisations: int = 5,
+    ) -> Posterior:
+        """The answer from these views, averaged over a grid of robot noise levels and sides.
+
+        `levels` (metres, radians) gives them instead; then `sides` are all that is compared.
+        """
+
+class Posterior:
+    """What is believed after some views, under all hypotheses together."""
+
+    @property
+    def x(self) -> NDArray[float64]: ...
+    @property
+    def y(self) -> NDArray[float64]: ...
+    @property
+    def camera_delta(self) -> list[float]: ...
+    @property
+    def covariance(self) -> NDArray[float64]: ...
+    @property
+    def degrees_of_freedom(self) -> float: ...
+    @property
+    def log_evidence(self) -> float: ...
+    @property
+    def origin(self) -> str: ...
+    @property
+    def variances_px2(self) -> list[float]: ...
+    @property
+    def hypotheses(self) -> list[tuple[str, float, float, float]]: ...
+    def information(self, rank: int) -> NDArray[float64]: ...

@@ -1,0 +1,25 @@
+"""Which view to take next, and when to stop; the robot and the camera stay outside."""
+
+from handeye.planning.candidates import Candidate, Pool
+from handeye.planning.planner import Planner, PlannerOptions, Proposal, Verdict, replay
+from handeye.planning.policies import POLICIES, Policy, make_policy
+from handeye.planning.stopping import Accuracy, GainThreshold, NumberOfViews, Stop, StopReason, StopRule
+
+__all__ = [
+    "POLICIES",
+    "Accuracy",
+    "Candidate",
+    "GainThreshold",
+    "NumberOfViews",
+    "Planner",
+    "PlannerOptions",
+    "Policy",
+    "Pool",
+    "Proposal",
+    "Stop",
+    "StopReason",
+    "StopRule",
+    "Verdict",
+    "make_policy",
+    "replay",
+]

@@ -1,0 +1,67 @@
+"""Where the camera could go next."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from handeye.errors import InputError
+from handeye.types.arrays import FloatArray
+from handeye.types.mounting import Mounting
+from handeye.types.pose import Pose
+from handeye.types.view import View
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A robot pose that could be taken, by name."""
+
+    name: str
+    T_base_flange: Pose
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Candidates not yet taken.
+
+    Raises
+    ------
+    InputError
+        Two candidates of one name.
+    """
+
+    candidates: tuple[Candidate, ...]
+
+    def __post_init__(self) -> None:
+        names = [candidate.name for candidate in self.candidates]
+        if len(set(names)) < len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            raise InputError(f"candidate {twice}: the name is there twice", code="duplicate_candidate")
+
+    @classmethod
+    def of_views(cls, views: Iterable[View]) -> "Pool":
+        """Return the robot poses of recorded views."""
+        return cls(tuple(Candidate(view.name, view.T_base_flange) for view in views))
+
+    @classmethod
+    def of_poses(cls, poses: Sequence[Pose], prefix: str = "candidate") -> "Pool":
+        """Return poses named by their place in the list, counted from one."""
+        width = len(str(len(poses)))
+        return cls(tuple(Candidate(f"{prefix}_{i:0{width}d}", pose) for i, pose in enumerate(poses, 1)))
+
+    def without(self, names: Iterable[str]) -> "Pool":
+        """Return the pool without these candidates."""
+        gone = set(names)
+        return Pool(tuple(c for c in self.candidates if c.name not in gone))
+
+    def __len__(self) -> int:
+        return len(self.candidates)
+
+    def motions(self, mounting: Mounting) -> FloatArray:
+        """(N, 4, 4) A of the chain of each candidate."""
+        return np.array([mounting.chain(c.T_base_flange).matrix for c in self.candidates]).reshape(-1, 4, 4)
+
+    @property
+    def positions(self) -> FloatArray:
+        """(N, 3) positions of the flange in the base, metres."""
+        return np.array([c.T_base_flange.translation for c in self.candidates]).reshape(-1, 3)

@@ -1,0 +1,180 @@
+"""The loop of the paper's Algorithm 1 as ask, tell, verdict; the world stays outside."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from handeye import _core
+from handeye.errors import InputError
+from handeye.planning.candidates import Candidate, Pool
+from handeye.planning.policies import NextBestView, Policy, Situation
+from handeye.planning.stopping import Stop, StopRule, first_verdict
+from handeye.solving.estimate import Estimate, Estimator, Sight
+from handeye.solving.measurements import Measurements
+from handeye.types.arrays import FloatArray
+from handeye.types.view import View
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """The next view to take.
+
+    Parameters
+    ----------
+    candidate
+        Where to go.
+    predicted_gain
+        Gain that the criterion predicts for it.
+    gains
+        (N,) gains of all candidates that were left, by `names`; NaN for infeasible ones.
+    """
+
+    candidate: Candidate
+    predicted_gain: float
+    gains: FloatArray
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What a view brought.
+
+    Parameters
+    ----------
+    estimate
+        What is believed with it.
+    predicted_gain
+        Gain that was predicted for it; NaN for a view that was not proposed.
+    realised_gain
+        By how much the entropy of all parameters fell; NaN if it was not finite before.
+    """
+
+    estimate: Estimate
+    predicted_gain: float
+    realised_gain: float
+
+
+@dataclass(frozen=True)
+class PlannerOptions:
+    """How to choose and when to stop."""
+
+    policy: Policy = field(default_factory=NextBestView)
+    criterion: _core.Criterion = field(default_factory=lambda: _core.Criterion("entropy"))
+    stop_rules: tuple[StopRule, ...] = ()
+    sight: Sight = field(default_factory=Sight)
+    seed: int = 0
+
+
+class Planner:
+    """Chooses views: `ask` proposes one or stops, the world measures it, `tell` takes it in.
+
+    Parameters
+    ----------
+    measurements
+        Views taken already, at least three.
+    pool
+        Candidates.
+    estimator
+        Turns measurements into an estimate.
+    options
+        Policy, criterion, stop rules, sight and seed.
+
+    Raises
+    ------
+    InputError
+        Fewer than three views.
+    """
+
+    def __init__(
+        self,
+        measurements: Measurements,
+        pool: Pool,
+        estimator: Estimator,
+        options: PlannerOptions | None = None,
+    ) -> None:
+        self._measurements = measurements
+        self._pool = pool.without(view.name for view in measurements.views)
+        self._estimator = estimator
+        self._options = options or PlannerOptions()
+        self._random = np.random.default_rng(self._options.seed)
+        self._estimate = estimator(measurements)
+        self._pending: Proposal | None = None
+
+    @property
+    def estimate(self) -> Estimate:
+        """What is believed now."""
+        return self._estimate
+
+    @property
+    def measurements(self) -> Measurements:
+        """Views taken so far."""
+        return self._measurements
+
+    @property
+    def pool(self) -> Pool:
+        """Candidates left."""
+        return self._pool
+
+    def gains(self) -> FloatArray:
+        """(N,) gain of each candidate left; NaN where too little of the target would be in sight."""
+        if len(self._pool) == 0:
+            return np.zeros(0)
+        motions = self._pool.motions(self._measurements.mounting)
+        return self._estimate.gains(self._options.criterion, motions, self._options.sight)
+
+    def ask(self) -> Proposal | Stop:
+        """Propose the next view, or say why there is none to take."""
+        gains = self.gains()
+        stop = first_verdict(self._options.stop_rules, len(self._measurements), self._estimate, gains)
+        if stop is not None:
+            return stop
+        situation = Situation(self._measurements.views, self._pool, gains, self._random)
+        choice = self._options.policy.choose(situation)
+        names = tuple(candidate.name for candidate in self._pool.candidates)
+        chosen = self._pool.candidates[choice.index]
+        self._pending = Proposal(chosen, float(gains[choice.index]), gains, names)
+        return self._pending
+
+    def tell(self, view: View) -> Verdict:
+        """Take in a view, proposed or not.
+
+        Raises
+        ------
+        InputError
+            The view's name is taken, or the pose of the target cannot be found in it; nothing has changed then.
+        """
+        if any(view.name == other.name for other in self._measurements.views):
+            raise InputError(f"view {view.name}: already taken", code="duplicate_view")
+        measurements = self._measurements.with_views([view])
+        if view.name in measurements.rejected:
+            raise InputError(f"view {view.name}: {measurements.rejected[view.name]}", code="unusable_view")
+        before = self._estimate
+        estimate = self._estimator(measurements, before)
+        proposal = self._pending
+        predicted = (
+            proposal.predicted_gain
+            if proposal is not None and proposal.candidate.name == view.name
+            else float("nan")
+        )
+        realised = before.entropy - estimate.entropy if np.isfinite(before.entropy) else float("nan")
+        self._measurements, self._estimate, self._pending = measurements, estimate, None
+        self._pool = self._pool.without([view.name])
+        return Verdict(estimate, predicted, realised)
+
+    def give_up(self, name: str) -> None:
+        """Take a candidate out of the pool that could not be reached or did not show the target."""
+        self._pool = self._pool.without([name])
+        self._pending = None
+
+
+def replay(planner: Planner, views: Sequence[View]) -> list[Proposal | Stop]:
+    """Run the loop on recorded views until it stops; the planner's candidates carry the views' names."""
+    by_name = {view.name: view for view in views}
+    history: list[Proposal | Stop] = []
+    while True:
+        answer = planner.ask()
+        history.append(answer)
+        if isinstance(answer, Stop):
+            return history
+        planner.tell(by_name[answer.candidate.name])

@@ -1,0 +1,57 @@
+"""What every policy is asked, and what it answers."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from handeye.planning.candidates import Pool
+from handeye.types.arrays import FloatArray
+from handeye.types.view import View
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """Everything that a policy may look at.
+
+    Parameters
+    ----------
+    views
+        Views taken so far.
+    pool
+        Candidates left, at least one.
+    gains
+        (N,) gain of each candidate; NaN where too little of the target would be in sight.
+    random
+        The planner's own source of chance.
+    """
+
+    views: Sequence[View]
+    pool: Pool
+    gains: FloatArray
+    random: np.random.Generator
+
+    @property
+    def feasible(self) -> FloatArray:
+        """(M,) indices of the candidates that show enough of the target."""
+        return np.flatnonzero(~np.isnan(self.gains))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The candidate chosen, by its index in the pool, and the score that decided."""
+
+    index: int
+    score: float
+
+
+class Policy(ABC):
+    """Chooses one of the feasible candidates."""
+
+    name: ClassVar[str]
+
+    @abstractmethod
+    def choose(self, situation: Situation) -> Choice:
+        """Return the candidate to take; there is at least one feasible one."""

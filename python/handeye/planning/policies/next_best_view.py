@@ -1,0 +1,16 @@
+"""The paper's policy: the candidate that teaches most."""
+
+import numpy as np
+
+from handeye.planning.policies.base import Choice, Policy, Situation
+
+
+class NextBestView(Policy):
+    """Take the candidate with the largest gain (Yang, Rebello and Waslander 2023, eq. 14); the first of equals."""
+
+    name = "next_best_view"
+
+    def choose(self, situation: Situation) -> Choice:
+        """Return the candidate with the largest gain."""
+        best = int(np.nanargmax(situation.gains))
+        return Choice(best, float(situation.gains[best]))

@@ -1,0 +1,23 @@
+"""From views to X and Y with their uncertainty."""
+
+from handeye.solving.auto import AutoEstimator, AutoOptions
+from handeye.solving.calibrate import calibrate, make_estimator, solve, to_calibration
+from handeye.solving.estimate import Estimate, Estimator, Sight
+from handeye.solving.measurements import Measurements, ViewPose, view_pose
+from handeye.solving.paper import paper_estimate
+
+__all__ = [
+    "AutoEstimator",
+    "AutoOptions",
+    "Estimate",
+    "Estimator",
+    "Measurements",
+    "Sight",
+    "ViewPose",
+    "calibrate",
+    "make_estimator",
+    "paper_estimate",
+    "solve",
+    "to_calibration",
+    "view_pose",
+]

@@ -1,0 +1,90 @@
+"""From a recording to a calibration: the one entry for whoever has views already."""
+
+import numpy as np
+
+from handeye.errors import DegenerateError
+from handeye.solving.auto import AutoEstimator
+from handeye.solving.estimate import Estimate, Estimator, regular_information
+from handeye.solving.initialize import check_views, closed_form_start
+from handeye.solving.measurements import Measurements
+from handeye.solving.paper import paper_estimate
+from handeye.types.arrays import FloatArray
+from handeye.types.calibration import Calibration, ModelName, ViewResult
+from handeye.types.recording import Recording
+
+
+def make_estimator(model: ModelName) -> Estimator:
+    """Return what estimates under a model's assumptions."""
+    return paper_estimate if ModelName(model) is ModelName.PAPER else AutoEstimator()
+
+
+def solve(recording: Recording, model: ModelName = ModelName.AUTO) -> Calibration:
+    """Calibrate from all usable views of a recording.
+
+    Raises
+    ------
+    InputError
+        Fewer than three usable views.
+    DegenerateError
+        The views do not determine the answer; the message names what they leave open.
+    SolveError
+        No minimum was found.
+    """
+    return calibrate(Measurements.of_recording(recording), ModelName(model))
+
+
+def calibrate(measurements: Measurements, model: ModelName = ModelName.AUTO) -> Calibration:
+    """Calibrate from measurements; see `solve`."""
+    check_views(measurements)
+    closed_form_start(measurements)  # Refuses motions that leave something open, in words.
+    estimate = make_estimator(model)(measurements)
+    if not estimate.determined:
+        raise DegenerateError(
+            "the views do not determine the hand-eye transform",
+            hint="add views with the camera turned about another axis",
+        )
+    return to_calibration(measurements, estimate)
+
+
+def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibration:
+    """Return the calibration of an estimate: residuals of every view, covariance, warnings."""
+    rmse = view_rmse_px(measurements, estimate)
+    views = [
+        ViewResult(view.name, float(value)) for view, value in zip(measurements.views, rmse, strict=True)
+    ]
+    views += [
+        ViewResult(name, float("nan"), used=False, reason=reason)
+        for name, reason in measurements.rejected.items()
+    ]
+    counts = measurements.point_counts
+    return Calibration(
+        mounting=measurements.mounting,
+        X=estimate.X,
+        Y=estimate.Y,
+        camera=estimate.camera,
+        covariance=estimate.hand_eye_covariance,
+        information=regular_information(estimate.covariance),
+        rmse_px=float(np.sqrt(np.sum(counts * rmse**2) / np.sum(counts))),
+        ending=estimate.ending,
+        iterations=estimate.iterations,
+        noise=estimate.noise,
+        model=estimate.model,
+        start=estimate.start,
+        views=tuple(views),
+        degrees_of_freedom=estimate.degrees_of_freedom,
+    )
+
+
+def view_rmse_px(measurements: Measurements, estimate: Estimate) -> FloatArray:
+    """(K,) root mean square over the points of each view of the residual's norm, robot poses as reported.
+
+    Infinite where the estimate puts the target out of sight.
+    """
+    with_camera = measurements.with_camera(estimate.camera)
+    problem = with_camera.problem
+    return np.array(
+        [
+            np.sqrt(problem.squared_error(estimate.X.matrix, estimate.Y.matrix, views=[k]) / count)
+            for k, count in enumerate(measurements.point_counts)
+        ]
+    )

@@ -1,0 +1,200 @@
+"""What is believed after some views: the values that planning and reporting build on."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from handeye import _core
+from handeye.errors import DegenerateError
+from handeye.solving.measurements import Measurements
+from handeye.types.arrays import FloatArray
+from handeye.types.calibration import ModelName, Noise, RobotSide
+from handeye.types.camera import Camera
+from handeye.types.mounting import Mounting
+from handeye.types.pose import Pose
+from handeye.types.target import Target
+
+# Hypotheses about the robot's noise that a gain is averaged over: the likeliest, up to this share and number.
+AVERAGED_SHARE = 0.95
+AVERAGED_COUNT = 12
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a candidate must show of the target to count.
+
+    Parameters
+    ----------
+    margin_px
+        Distance of every counted point from the border of the image.
+    fewest
+        Fewest points in sight; None for all of the target.
+    known
+        The candidates are recorded views that are known to show the target: nothing is checked but that the lens
+        can see it at the current estimate.
+    """
+
+    margin_px: float = 0.0
+    fewest: int | None = None
+    known: bool = False
+
+
+def side_of_chain(mounting: Mounting, side: RobotSide) -> str | None:
+    """Return which side of A in the chain a side of the robot is: "left", "right", or None for no noise."""
+    if side is RobotSide.NONE:
+        return None
+    flange_is_left = mounting is Mounting.EYE_IN_HAND
+    return "left" if (side is RobotSide.FLANGE) == flange_is_left else "right"
+
+
+def side_of_robot(mounting: Mounting, side: str) -> RobotSide:
+    """Return which side of the robot a side of A in the chain is; "none" is none."""
+    if side == "none":
+        return RobotSide.NONE
+    flange_is_left = mounting is Mounting.EYE_IN_HAND
+    return RobotSide.FLANGE if (side == "left") == flange_is_left else RobotSide.BASE
+
+
+def isotropic_root(translation_m: float, rotation_rad: float) -> FloatArray:
+    """Return the square root (6, 6) of the covariance of a twist with these deviations per axis."""
+    return np.diag([translation_m] * 3 + [rotation_rad] * 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """What the robot's noise may be, how probable that is, and the information (n, n) under it."""
+
+    probability: float
+    robot_side: RobotSide
+    robot_translation_m: float
+    robot_rotation_rad: float
+    information: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters and their uncertainty after some views.
+
+    Parameters
+    ----------
+    X, Y, camera
+        The current answer.
+    covariance
+        (n, n) covariance of `[xi_x, xi_y, free camera parameters]`.
+    hypotheses
+        What the robot's noise may be, likeliest first; one that is exact under the paper's model.
+    free_camera
+        Indices of the free camera parameters.
+    candidate_sigma_px
+        Pixel noise expected of a further view.
+    determined
+        Whether the views determine the answer without prior belief about X and Y.
+    """
+
+    mounting: Mounting
+    target: Target
+    X: Pose
+    Y: Pose
+    camera: Camera
+    covariance: FloatArray
+    hypotheses: tuple[Hypothesis, ...]
+    noise: Noise
+    model: ModelName
+    start: str
+    ending: str
+    iterations: int
+    candidate_sigma_px: float
+    free_camera: tuple[int, ...] = ()
+    determined: bool = True
+    degrees_of_freedom: float = float("inf")
+
+    @property
+    def entropy(self) -> float:
+        """Entropy of all parameters in nats: `1/2 ln((2 pi e)^n |Sigma|)` (paper, section IV)."""
+        sign, log_determinant = np.linalg.slogdet(self.covariance)
+        if sign <= 0:
+            return float("inf")
+        return 0.5 * float(len(self.covariance) * np.log(2 * np.pi * np.e) + log_determinant)
+
+    @property
+    def chain_entropy(self) -> float:
+        """Entropy of X and Y alone, in nats: comparable between models with and without camera parameters."""
+        sign, log_determinant = np.linalg.slogdet(self.covariance[:12, :12])
+        return 0.5 * float(12 * np.log(2 * np.pi * np.e) + log_determinant) if sign > 0 else float("inf")
+
+    @property
+    def hand_eye_covariance(self) -> FloatArray:
+        """(6, 6) covariance of the twist of X."""
+        return self.covariance[:6, :6]
+
+    @cached_property
+    def _averaged(self) -> tuple[tuple[float, Hypothesis], ...]:
+        chosen: list[tuple[float, Hypothesis]] = []
+        mass = 0.0
+        for hypothesis in self.hypotheses[:AVERAGED_COUNT]:
+            chosen.append((hypothesis.probability, hypothesis))
+            mass += hypothesis.probability
+            if mass >= AVERAGED_SHARE:
+                break
+        return tuple((probability / mass, hypothesis) for probability, hypothesis in chosen)
+
+    def predictor(self, hypothesis: Hypothesis, sight: Sight) -> _core.Predictor:
+        """Return what predicts candidate views from this estimate under one hypothesis."""
+        side = side_of_chain(self.mounting, hypothesis.robot_side)
+        root = isotropic_root(hypothesis.robot_translation_m, hypothesis.robot_rotation_rad)
+        width, height = self.camera.size_px
+        return _core.Predictor(
+            self.camera.lens,
+            self.camera.parameters,
+            self.target.points,
+            self.target.radii_m,
+            self.X.matrix,
+            self.Y.matrix,
+            pixel_sigma=self.candidate_sigma_px,
+            robot_side=side,
+            robot_root=None if side is None else root,
+            free_camera=list(self.free_camera) or None,
+            image_size=None if sight.known else (width, height),
+            margin_px=sight.margin_px,
+            fewest=1 if sight.known else sight.fewest or self.target.point_count,
+        )
+
+    def gains(self, criterion: _core.Criterion, motions: FloatArray, sight: Sight) -> FloatArray:
+        """(N,) gain of candidate views at `motions` (N, 4, 4), averaged over what the robot's noise may be.
+
+        NaN where too little of the target would be in sight.
+
+        Raises
+        ------
+        DegenerateError
+            The information is singular.
+        """
+        total = np.zeros(len(motions))
+        for probability, hypothesis in self._averaged:
+            belief = _core.Belief(hypothesis.information)
+            total += probability * self.predictor(hypothesis, sight).gains(belief, criterion, motions)
+        return total
+
+
+class Estimator(Protocol):
+    """Turns measurements into an estimate; a previous one helps as a start."""
+
+    def __call__(self, measurements: Measurements, previous: Estimate | None = None) -> Estimate:
+        """Estimate from these measurements."""
+        ...
+
+
+def regular_information(covariance: FloatArray) -> FloatArray:
+    """Return the inverse of a covariance.
+
+    Raises
+    ------
+    DegenerateError
+        It is singular.
+    """
+    try:
+        return np.linalg.inv(covariance)
+    except np.linalg.LinAlgError as error:
+        raise DegenerateError("the covariance is singular") from error

@@ -1,0 +1,155 @@
+"""Views as the core takes them: flat arrays, the robot's motions, and the pose of the target in each view."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from handeye import _core
+from handeye.errors import HandeyeError, InputError
+from handeye.types.arrays import FloatArray
+from handeye.types.camera import Camera
+from handeye.types.mounting import Mounting
+from handeye.types.pose import Pose
+from handeye.types.recording import Recording
+from handeye.types.target import Target
+from handeye.types.view import View
+
+MIN_POINTS = 4
+
+
+@dataclass(frozen=True)
+class ViewPose:
+    """The pose of the target in one view, from that view's image alone.
+
+    Parameters
+    ----------
+    T_camera_target
+        The pose that fits best.
+    rmse_px
+        Root mean square over the points of the residual's norm.
+    information
+        (6, 6) information of the pose's left perturbation at a pixel noise of 1 px.
+    mirrored
+        The second minimum of a planar target, and its `rmse_px`; None if there is only one.
+    """
+
+    T_camera_target: Pose
+    rmse_px: float
+    information: FloatArray
+    mirrored: tuple[Pose, float] | None
+
+    @property
+    def ambiguity_ratio(self) -> float:
+        """Error of the mirrored pose over the error of the best; infinite if there is only one."""
+        return float("inf") if self.mirrored is None else self.mirrored[1] / max(self.rmse_px, 1e-12)
+
+
+def view_pose(camera: Camera, target: Target, view: View) -> ViewPose:
+    """Find the pose of the target in one view.
+
+    Raises
+    ------
+    InputError, DegenerateError, SolveError
+        Fewer than four points, points on a line, or no pose that fits; the message names the view.
+    """
+    if len(view) < MIN_POINTS:
+        raise InputError(
+            f"view {view.name}: {len(view)} points, at least {MIN_POINTS} are needed", code="too_few_points"
+        )
+    points = target.points[view.point_ids]
+    radii = target.radii_m[view.point_ids]
+    try:
+        best, mirrored = _core.planar_pose(camera.lens, camera.parameters, points, radii, view.pixels)
+    except HandeyeError as error:
+        raise type(error)(f"view {view.name}: {error}", code=error.code, hint=error.hint) from error
+    return ViewPose(
+        Pose(best[0]), best[1], best[2], None if mirrored is None else (Pose(mirrored[0]), mirrored[1])
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """Views of one target through one camera, ready to be solved.
+
+    Views whose pose cannot be found alone do not belong here: `Measurements.of` leaves them out and says so in
+    `rejected`.
+    """
+
+    mounting: Mounting
+    camera: Camera
+    target: Target
+    views: tuple[View, ...]
+    poses: tuple[ViewPose, ...]
+    rejected: dict[str, str] = field(default_factory=dict[str, str])
+
+    @classmethod
+    def of(
+        cls, mounting: Mounting, camera: Camera, target: Target, views: Iterable[View] = ()
+    ) -> "Measurements":
+        """Measure the pose of the target in every view."""
+        return cls(mounting, camera, target, (), ()).with_views(views)
+
+    @classmethod
+    def of_recording(cls, recording: Recording) -> "Measurements":
+        """Take the views of a recording."""
+        return cls.of(recording.mounting, recording.camera, recording.target, recording.views)
+
+    def with_views(self, views: Iterable[View]) -> "Measurements":
+        """Return the measurements with more views."""
+        kept, poses, rejected = list(self.views), list(self.poses), dict(self.rejected)
+        for view in views:
+            try:
+                pose = view_pose(self.camera, self.target, view)
+            except HandeyeError as error:
+                rejected[view.name] = error.message.removeprefix(f"view {view.name}: ")
+            else:
+                kept.append(view)
+                poses.append(pose)
+        return replace(self, views=tuple(kept), poses=tuple(poses), rejected=rejected)
+
+    def select(self, indices: Sequence[int]) -> "Measurements":
+        """Return the measurements of these views, in this order."""
+        return replace(
+            self, views=tuple(self.views[i] for i in indices), poses=tuple(self.poses[i] for i in indices)
+        )
+
+    def with_camera(self, camera: Camera) -> "Measurements":
+        """Return the measurements as seen through a camera close to this one; poses stay as they are."""
+        return replace(self, camera=camera)
+
+    def __len__(self) -> int:
+        return len(self.views)
+
+    @cached_property
+    def motions(self) -> FloatArray:
+        """(K, 4, 4) A of the chain of each view."""
+        return np.array([self.mounting.chain(v.T_base_flange).matrix for v in self.views]).reshape(-1, 4, 4)
+
+    @cached_property
+    def camera_poses(self) -> FloatArray:
+        """(K, 4, 4) `T_camera_target` of each view, from its image alone."""
+        return np.array([pose.T_camera_target.matrix for pose in self.poses]).reshape(-1, 4, 4)
+
+    @cached_property
+    def point_counts(self) -> FloatArray:
+        """(K,) number of points of each view."""
+        return np.array([len(view) for view in self.views], dtype=float)
+
+    @cached_property
+    def problem(self) -> _core.Problem:
+        """The measurements inside the core."""
+        points = [self.target.points[view.point_ids] for view in self.views]
+        offsets = np.concatenate([[0], np.cumsum([len(view) for view in self.views])])
+        return _core.Problem(
+            self.camera.lens,
+            self.camera.parameters,
+            np.concatenate(points) if points else np.zeros((0, 3)),
+            np.concatenate([self.target.radii_m[view.point_ids] for view in self.views])
+            if points
+            else np.zeros(0),
+            np.concatenate([view.pixels for view in self.views]) if points else np.zeros((0, 2)),
+            [int(offset) for offset in offsets],
+            self.motions,
+        )
