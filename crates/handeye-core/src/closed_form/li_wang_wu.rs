@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
 
 use super::Estimate;
 use super::linear::least_squares;
-use super::rotation_fit::rotation_of_either_sign;
+use super::rotation_fit::rotation_of_unit_scale;
+use super::translation::robot_world_translations;
 use crate::error::Error;
 use crate::se3::Se3;
 
@@ -15,10 +16,9 @@ pub(super) const PAPER: &str = "A. Li, L. Wang and D. Wu, \"Simultaneous robot-w
 /// `X` and `Y` of `C = X A Y`, as `C W = X A` with `W = Y^-1`.
 ///
 /// Eq. 19: twelve rows per view for `vec(R_W)`, `vec(R_X)` (by rows), `t_W` and `t_X`; the two rotations are
-/// then scaled and made orthogonal. The scale of the rotations comes from the translations alone, so views
-/// that only turn about the camera's centre are refused. With noise this is the least accurate of the
-/// methods: neither rotation knows of the other's orthogonality, and the translations are those of the
-/// rotations before they were made orthogonal.
+/// then made orthogonal. Their scale comes from the translations alone, so views that only turn about the
+/// camera's centre are refused. The translations are solved for anew once the rotations are orthogonal: those
+/// of the linear system belong to the matrices before, and are worse.
 pub(super) fn solve(a: &[Se3], c: &[Se3]) -> Result<Estimate, Error> {
     let mut matrix = DMatrix::zeros(12 * a.len(), 24);
     let mut rhs = DVector::zeros(12 * a.len());
@@ -37,9 +37,9 @@ pub(super) fn solve(a: &[Se3], c: &[Se3]) -> Result<Estimate, Error> {
     }
     let solution = least_squares(matrix, rhs, "the rotations and translations of X and Y at once")?;
     let rotation = |first: usize| {
-        rotation_of_either_sign(&Matrix3::from_row_slice(&solution.as_slice()[first..first + 9]))
+        rotation_of_unit_scale(&Matrix3::from_row_slice(&solution.as_slice()[first..first + 9]))
     };
-    let translation = |first: usize| solution.fixed_rows::<3>(first).into_owned();
-    let w = Se3::new(rotation(0)?, translation(18));
-    Ok(Estimate { x: Se3::new(rotation(9)?, translation(21)), y: w.inverse() })
+    let (w, x) = (rotation(0)?, rotation(9)?);
+    let (t_w, t_x) = robot_world_translations(a, c, &x)?;
+    Ok(Estimate { x: Se3::new(x, t_x), y: Se3::new(w, t_w).inverse() })
 }

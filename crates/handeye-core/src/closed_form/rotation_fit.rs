@@ -1,9 +1,14 @@
 //! The rotation that best maps one list of vectors to another.
 
+use std::ops::RangeInclusive;
+
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::linear::{RANK_TOLERANCE, singular};
 use crate::error::Error;
+
+/// Singular values of a matrix that may pass for a rotation seen through noise.
+const ROTATION_LIKE: RangeInclusive<f64> = 0.5..=2.0;
 
 /// Singular values and vectors of `sum p q'`, third vectors completed to right-handed bases.
 pub(super) struct Correlation {
@@ -54,8 +59,8 @@ pub(super) fn rotation_from_correlation(sum: &Matrix3<f64>) -> Result<Matrix3<f6
     Ok(correlation.left * correlation.right.transpose())
 }
 
-/// The rotation nearest to a matrix that is a rotation times a scale of either sign: `sign(det M) / |det
-/// M|^(1/3) M`, then made orthogonal (Andreff et al. 1999, eq. 15).
+/// The rotation nearest to a matrix that is a rotation times a scale of either sign, such as a singular
+/// vector: `sign(det M) / |det M|^(1/3) M`, then made orthogonal.
 ///
 /// # Errors
 /// [`Error::Numerical`] if the matrix is too near to singular to be meant as a rotation.
@@ -69,4 +74,21 @@ pub(super) fn rotation_of_either_sign(m: &Matrix3<f64>) -> Result<Matrix3<f64>, 
         )));
     }
     rotation_from_correlation(&(m * determinant.signum()))
+}
+
+/// The rotation nearest to a matrix that a linear solution says is one.
+///
+/// # Errors [`Error::Numerical`] if it is far from one: its singular values, all 1 for a rotation, must lie
+/// in [`ROTATION_LIKE`]. A linear system that takes the scale from the translations ends near zero where they
+/// are nothing but noise, and what direction is left there is noise too.
+pub(super) fn rotation_of_unit_scale(m: &Matrix3<f64>) -> Result<Matrix3<f64>, Error> {
+    let correlation = Correlation::of(m)?;
+    if correlation.values.iter().all(|value| ROTATION_LIKE.contains(value)) {
+        return Ok(correlation.left * correlation.right.transpose());
+    }
+    let [first, second, third] = correlation.values.into();
+    Err(Error::numerical(format!(
+        "the linear solution is no rotation: its singular values are {first:.3}, {second:.3} and {third:.3} \
+         instead of 1; the translations of these views say too little about the scale"
+    )))
 }
