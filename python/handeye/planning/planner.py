@@ -9,7 +9,7 @@ from handeye import _core
 from handeye.errors import InputError
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.policies import NextBestView, Policy, Situation
-from handeye.planning.stopping import Stop, StopRule, first_verdict
+from handeye.planning.stopping import State, Stop, StopRule, first_verdict
 from handeye.solving.estimate import Estimate, Estimator, Sight
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
@@ -126,7 +126,8 @@ class Planner:
     def ask(self) -> Proposal | Stop:
         """Propose the next view, or say why there is none to take."""
         gains = self.gains()
-        stop = first_verdict(self._options.stop_rules, len(self._measurements), self._estimate, gains)
+        state = State(len(self._measurements), self._estimate, gains)
+        stop = first_verdict(self._options.stop_rules, state)
         if stop is not None:
             return stop
         situation = Situation(self._measurements.views, self._pool, gains, self._random)
@@ -142,7 +143,7 @@ class Planner:
         Raises
         ------
         InputError
-            The view's name is taken, or the pose of the target cannot be found in it; nothing has changed then.
+            The view's name is taken, or the target's pose cannot be found in it; nothing has changed then.
         """
         if any(view.name == other.name for other in self._measurements.views):
             raise InputError(f"view {view.name}: already taken", code="duplicate_view")

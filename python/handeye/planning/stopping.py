@@ -31,22 +31,26 @@ class Stop:
     evidence: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
+@dataclass(frozen=True, eq=False)
+class State:
+    """What a stop rule may look at: views taken, what is believed, gains (N,) of the candidates left."""
+
+    views: int
+    estimate: Estimate
+    gains: FloatArray
+
+    @property
+    def best_gain(self) -> float | None:
+        """Largest gain; None without a feasible candidate."""
+        return None if np.all(np.isnan(self.gains)) else float(np.nanmax(self.gains))
+
+
 class StopRule(ABC):
     """Looks at the state before a proposal is made."""
 
     @abstractmethod
-    def verdict(self, views: int, estimate: Estimate, gains: FloatArray) -> Stop | None:
-        """Return the end, or None to go on.
-
-        Parameters
-        ----------
-        views
-            Number of views taken.
-        estimate
-            What is believed.
-        gains
-            (N,) gains of the candidates left; NaN for infeasible ones.
-        """
+    def verdict(self, state: State) -> Stop | None:
+        """Return the end, or None to go on."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +69,12 @@ class NumberOfViews(StopRule):
         if self.views < 3:
             raise InputError(f"number of views {self.views}, expected at least 3", code="out_of_range")
 
-    def verdict(self, views: int, estimate: Estimate, gains: FloatArray) -> Stop | None:
+    def verdict(self, state: State) -> Stop | None:
         """Stop once enough views are taken."""
-        if views < self.views:
+        if state.views < self.views:
             return None
-        return Stop(
-            StopReason.VIEWS_TAKEN, f"{views} views taken, as asked", {"views": views, "asked": self.views}
-        )
+        evidence = {"views": state.views, "asked": self.views}
+        return Stop(StopReason.VIEWS_TAKEN, f"{state.views} views taken, as asked", evidence)
 
 
 @dataclass(frozen=True)
@@ -80,12 +83,10 @@ class GainThreshold(StopRule):
 
     threshold_nats: float
 
-    def verdict(self, views: int, estimate: Estimate, gains: FloatArray) -> Stop | None:
+    def verdict(self, state: State) -> Stop | None:
         """Stop once no candidate gains the threshold."""
-        if not estimate.determined or np.all(np.isnan(gains)):
-            return None
-        best = float(np.nanmax(gains))
-        if best >= self.threshold_nats:
+        best = state.best_gain
+        if not state.estimate.determined or best is None or best >= self.threshold_nats:
             return None
         return Stop(
             StopReason.GAIN_BELOW_THRESHOLD,
@@ -101,11 +102,11 @@ class Accuracy(StopRule):
     sigma_translation_mm: float
     sigma_rotation_deg: float
 
-    def verdict(self, views: int, estimate: Estimate, gains: FloatArray) -> Stop | None:
+    def verdict(self, state: State) -> Stop | None:
         """Stop once both are reached."""
-        if not estimate.determined:
+        if not state.estimate.determined:
             return None
-        covariance = estimate.hand_eye_covariance
+        covariance = state.estimate.hand_eye_covariance
         translation = float(np.sqrt(np.trace(covariance[:3, :3])) * 1e3)
         rotation = float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:]))))
         if translation > self.sigma_translation_mm or rotation > self.sigma_rotation_deg:
@@ -117,18 +118,16 @@ class Accuracy(StopRule):
         )
 
 
-def first_verdict(
-    rules: Sequence[StopRule], views: int, estimate: Estimate, gains: FloatArray
-) -> Stop | None:
+def first_verdict(rules: Sequence[StopRule], state: State) -> Stop | None:
     """Return the first end that a rule calls for; without a feasible candidate there is always one."""
     for rule in rules:
-        stop = rule.verdict(views, estimate, gains)
+        stop = rule.verdict(state)
         if stop is not None:
             return stop
-    if np.all(np.isnan(gains)):
+    if state.best_gain is None:
         return Stop(
             StopReason.NO_CANDIDATE,
             "no candidate left that shows enough of the target",
-            {"candidates": len(gains)},
+            {"candidates": len(state.gains)},
         )
     return None

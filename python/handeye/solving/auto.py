@@ -1,8 +1,8 @@
 """The default model: robot and camera are known only roughly, and the data say how roughly.
 
-Robot noise is marginalised on the flange side, on the base side or not at all; its levels and its side are weighed
-by their restricted likelihood and the answer is averaged over them. Camera parameters have the covariance of
-their calibration, inflated, as a prior. Every view has its own pixel noise.
+Robot noise is marginalised on the flange side, on the base side or not at all; its levels and its side are
+weighed by their restricted likelihood and the answer is averaged over them. Camera parameters have the
+covariance of their calibration, inflated, as a prior. Every view has its own pixel noise.
 """
 
 from dataclasses import dataclass, replace
@@ -19,13 +19,13 @@ from handeye.types.calibration import ModelName, Noise, RobotSide
 from handeye.types.camera import Camera
 from handeye.types.pose import Pose
 
-# The covariance of a camera calibration is a plain inverse of J'J: too small by about this factor in deviation.
+# A camera calibration's covariance is a plain inverse of J'J: too small by about this factor in deviation.
 CAMERA_INFLATION = 1.5
 # Degrees of freedom below which regions would have no useful quantile.
 FEWEST_DEGREES_OF_FREEDOM = 4.5
 # A mirrored pose is looked at where it fits less than this many times worse than the best.
 MIRROR_RATIO = 8.0
-# Without a covariance: relative focal length, principal point as a share of the width, distortion coefficients.
+# Without a covariance: relative focal length, principal point as a share of the width, coefficients.
 DEFAULT_FOCAL_SIGMA = 0.002
 DEFAULT_CENTRE_SIGMA = 0.002
 DEFAULT_DISTORTION_SIGMA = 0.02
@@ -70,7 +70,7 @@ class AutoOptions:
     sides
         Sides on which the robot's error may act.
     levels
-        Translation (metres) and rotation (radians) deviations of the robot if they are known; None to find them.
+        Translation (metres) and rotation (radians) deviations of the robot if known; None to find them.
     camera_inflation
         Factor on the deviations of the camera's calibration.
     free_camera

@@ -32,8 +32,8 @@ class Sight:
     fewest
         Fewest points in sight; None for all of the target.
     known
-        The candidates are recorded views that are known to show the target: nothing is checked but that the lens
-        can see it at the current estimate.
+        The candidates are recorded views that are known to show the target: nothing is checked but that the
+        lens can see it at the current estimate.
     """
 
     margin_px: float = 0.0
@@ -195,6 +195,6 @@ def regular_information(covariance: FloatArray) -> FloatArray:
         It is singular.
     """
     try:
-        return np.linalg.inv(covariance)
+        return np.asarray(np.linalg.inv(covariance), dtype=np.float64)
     except np.linalg.LinAlgError as error:
         raise DegenerateError("the covariance is singular") from error

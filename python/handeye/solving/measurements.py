@@ -73,8 +73,8 @@ def view_pose(camera: Camera, target: Target, view: View) -> ViewPose:
 class Measurements:
     """Views of one target through one camera, ready to be solved.
 
-    Views whose pose cannot be found alone do not belong here: `Measurements.of` leaves them out and says so in
-    `rejected`.
+    Views whose pose cannot be found alone do not belong here: `Measurements.of` leaves them out and says so
+    in `rejected`.
     """
 
     mounting: Mounting

@@ -130,8 +130,8 @@ class Calibration:
     rmse_px
         Root mean square over all points of all used views of the residual's norm.
     degrees_of_freedom
-        Degrees of freedom of the noise levels behind the covariance; infinite if they were given. Regions take
-        quantiles of F(6, degrees of freedom) in place of chi-square.
+        Degrees of freedom of the noise levels behind the covariance; infinite if they were given. Regions
+        take quantiles of F(6, degrees of freedom) in place of chi-square.
     """
 
     mounting: Mounting

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from handeye.planning.candidates import Pool
-from handeye.types.arrays import FloatArray
+from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.view import View
 
 
@@ -34,9 +34,9 @@ class Situation:
     random: np.random.Generator
 
     @property
-    def feasible(self) -> FloatArray:
+    def feasible(self) -> IndexArray:
         """(M,) indices of the candidates that show enough of the target."""
-        return np.flatnonzero(~np.isnan(self.gains))
+        return np.flatnonzero(~np.isnan(self.gains)).astype(np.int64)
 
 
 @dataclass(frozen=True)

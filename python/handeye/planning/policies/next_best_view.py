@@ -6,7 +6,10 @@ from handeye.planning.policies.base import Choice, Policy, Situation
 
 
 class NextBestView(Policy):
-    """Take the candidate with the largest gain (Yang, Rebello and Waslander 2023, eq. 14); the first of equals."""
+    """Take the candidate with the largest gain; the first of equals.
+
+    Yang, Rebello and Waslander (2023), eq. 14.
+    """
 
     name = "next_best_view"
 
