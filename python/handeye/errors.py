@@ -12,6 +12,7 @@ class ExitCode(IntEnum):
     """Exit codes of the command line."""
 
     SUCCESS = 0
+    UNEXPECTED = 1
     USAGE = 2
     UNUSABLE_INPUT = 3
     DEGENERATE = 4

@@ -1,0 +1,126 @@
+"""The one place where errors become words and exit codes, and answers become output."""
+
+import contextlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Any
+
+from cyclopts import CycloptsError
+
+from handeye.cli.answer import Answer, json_text
+from handeye.cli.app import make_app
+from handeye.errors import ExitCode, HandeyeError
+
+REPORT = (
+    "This is a mistake in handeye. Please report it with the command, what --debug prints, and the version."
+)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run a command and return its exit code; nothing is raised."""
+    # Looked for by hand: they must hold even where the rest of the line cannot be understood.
+    options = list(arguments)[: list(arguments).index("--")] if "--" in arguments else list(arguments)
+    as_json, debug = "--json" in options, "--debug" in options
+    try:
+        answer: Any = make_app()(list(arguments), exit_on_error=False, print_error=False)
+        if isinstance(answer, Answer):
+            _print(answer, as_json=as_json)
+        sys.stdout.flush()
+        return ExitCode.SUCCESS
+    except CycloptsError as error:
+        return _fail(_usage(error), as_json=as_json, debug=debug)
+    except HandeyeError as error:
+        return _fail(error, as_json=as_json, debug=debug)
+    except KeyboardInterrupt:
+        _silence_stdout()
+        _complain("interrupted")
+        return ExitCode.INTERRUPTED
+    except BrokenPipeError:
+        _silence_stdout()  # whoever read has seen enough
+        return ExitCode.OUTPUT
+    except OSError as error:
+        if _is_about_stdout(error):
+            _silence_stdout()
+            _complain(f"error: the output cannot be written: {(error.strerror or str(error)).lower()}")
+            return ExitCode.OUTPUT
+        return _fail(_unexpected(error), as_json=as_json, debug=debug)
+    except Exception as error:  # noqa: BLE001 - the boundary
+        return _fail(_unexpected(error), as_json=as_json, debug=debug)
+
+
+class UsageError(HandeyeError):
+    """The command line is not understood."""
+
+    exit_code = ExitCode.USAGE
+    default_code = "usage"
+
+
+class UnexpectedError(HandeyeError):
+    """Something that should not have happened."""
+
+    exit_code = ExitCode.UNEXPECTED
+    default_code = "unexpected"
+
+
+def _usage(error: CycloptsError) -> HandeyeError:
+    chain = " ".join(["handeye", *(error.command_chain or ())])
+    message = " ".join(str(error).split())
+    return UsageError(message, hint=f"{chain} --help says what can be asked").with_traceback(
+        error.__traceback__
+    )
+
+
+def _unexpected(error: Exception) -> HandeyeError:
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return UnexpectedError(f"unexpected {text}", hint=REPORT).with_traceback(error.__traceback__)
+
+
+def _print(answer: Answer, *, as_json: bool) -> None:
+    if as_json:
+        sys.stdout.write(json_text(answer.data))
+        return
+    from rich.console import Console  # noqa: PLC0415 - a program reading JSON need not wait for it
+
+    answer.show(Console(highlight=False))
+
+
+def _fail(error: HandeyeError, *, as_json: bool, debug: bool) -> int:
+    if as_json:
+        described = {
+            "code": error.code,
+            "message": error.message,
+            "hint": error.hint,
+            "exit_code": int(error.exit_code),
+        }
+        try:
+            sys.stdout.write(json_text({"error": described}))
+            sys.stdout.flush()
+        except OSError:
+            _silence_stdout()
+    if debug:
+        _complain("".join(traceback.format_exception(error.__cause__ or error)).rstrip())
+    _complain(f"error: {error.message}")
+    if error.hint is not None:
+        _complain(f"hint: {error.hint}")
+    return int(error.exit_code)
+
+
+def _complain(text: str) -> None:
+    with contextlib.suppress(OSError, ValueError):
+        print(text, file=sys.stderr, flush=True)
+
+
+def _is_about_stdout(error: OSError) -> bool:
+    """Tell whether the system refused to take what was printed: a full disk behind stdout, or none at all.
+
+    Errors of files that a command reads or writes name the file, and are `HandeyeError` anyway.
+    """
+    return error.filename is None
+
+
+def _silence_stdout() -> None:
+    """Keep the interpreter from complaining again when it flushes stdout at its end."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

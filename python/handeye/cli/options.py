@@ -1,0 +1,17 @@
+"""Options that every command has."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from cyclopts import Parameter
+
+
+@Parameter(name="*", group="Common")
+@dataclass(frozen=True)
+class Common:
+    """Options of every command; the boundary obeys them, so commands only pass them on."""
+
+    json: Annotated[bool, Parameter(negative=(), show_default=False)] = False
+    """Print one JSON object instead of text."""
+    debug: Annotated[bool, Parameter(negative=(), show_default=False)] = False
+    """Show where an error arose."""

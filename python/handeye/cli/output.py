@@ -1,0 +1,57 @@
+"""Files that a command writes: refused before the work begins, written whole or not at all."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from handeye.cli.answer import json_text
+from handeye.datasets.writing import replace_file
+from handeye.errors import OutputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def check_output(path: Path | None) -> None:
+    """Refuse a place that cannot be written to, before the work rather than after it.
+
+    Raises
+    ------
+    OutputError
+        A folder, or a file whose folder does not exist.
+    """
+    if path is None:
+        return
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder", hint="give the name of a file")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: the folder {path.parent} does not exist", hint="create it first")
+
+
+def write_json(path: Path, data: Mapping[str, Any]) -> None:
+    """Write one JSON object.
+
+    Raises
+    ------
+    OutputError
+        The system refuses to write; an older file is as it was.
+    """
+    replace_file(path, json_text(data).encode())
+
+
+def write_figure(path: Path, figure: "Figure") -> None:
+    """Write a picture in the format of its suffix (png, svg, pdf).
+
+    Raises
+    ------
+    OutputError
+        An unknown format, or the system refuses to write; an older file is as it was.
+    """
+    from io import BytesIO  # noqa: PLC0415 - pictures are rare
+
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in {"png", "svg", "pdf"}:
+        raise OutputError(f"{path}: no picture format, expected .png, .svg or .pdf", code="unknown_format")
+    content = BytesIO()
+    figure.savefig(content, format=kind)  # pyright: ignore[reportUnknownMemberType]
+    replace_file(path, content.getvalue())
