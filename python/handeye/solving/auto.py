@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handeye import _core
-from handeye.errors import DegenerateError
 from handeye.solving.estimate import Estimate, Hypothesis, side_of_robot
-from handeye.solving.initialize import check_views, closed_form_start
+from handeye.solving.initialize import check_views
 from handeye.solving.measurements import Measurements, ViewPose
+from handeye.solving.observability import undetermined
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName, Noise, RobotSide
 from handeye.types.camera import Camera
@@ -138,32 +138,26 @@ class AutoEstimator:
             if probability > 1e-4
         )
         sigma_px = np.sqrt(posterior.variances_px2)
+        X, Y = Pose(posterior.x), Pose(posterior.y)
+        noise = _noise(sigma_px, hypotheses)
         return Estimate(
             mounting=mounting,
             target=measurements.target,
-            X=Pose(posterior.x),
-            Y=Pose(posterior.y),
+            X=X,
+            Y=Y,
             camera=camera,
             covariance=posterior.covariance,
             hypotheses=hypotheses,
-            noise=_noise(sigma_px, hypotheses),
+            noise=noise,
             model=ModelName.AUTO,
             start=posterior.origin,
             ending="converged_average",
             iterations=0,
             candidate_sigma_px=float(np.median(sigma_px)),
             free_camera=prior.free,
-            determined=_determined(measurements),
+            unobservable=undetermined(measurements, X, Y, noise),
             degrees_of_freedom=max(posterior.degrees_of_freedom, FEWEST_DEGREES_OF_FREEDOM),
         )
-
-
-def _determined(measurements: Measurements) -> bool:
-    try:
-        closed_form_start(measurements)
-    except DegenerateError:
-        return False
-    return True
 
 
 def _noise(sigma_px: FloatArray, hypotheses: tuple[Hypothesis, ...]) -> Noise:

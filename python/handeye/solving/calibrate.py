@@ -5,7 +5,7 @@ import numpy as np
 from handeye.errors import DegenerateError
 from handeye.solving.auto import AutoEstimator
 from handeye.solving.estimate import Estimate, Estimator, regular_information
-from handeye.solving.initialize import check_views, closed_form_start
+from handeye.solving.initialize import check_views
 from handeye.solving.measurements import Measurements
 from handeye.solving.paper import paper_estimate
 from handeye.types.arrays import FloatArray
@@ -18,31 +18,41 @@ def make_estimator(model: ModelName) -> Estimator:
     return paper_estimate if ModelName(model) is ModelName.PAPER else AutoEstimator()
 
 
-def solve(recording: Recording, model: ModelName = ModelName.AUTO) -> Calibration:
+def solve(recording: Recording, model: ModelName = ModelName.AUTO, *, reduced: bool = False) -> Calibration:
     """Calibrate from all usable views of a recording.
+
+    Parameters
+    ----------
+    recording
+        Views, camera and target.
+    model
+        Assumptions about robot and camera.
+    reduced
+        Answer even where the views leave directions open: these are listed in `unobservable`, a weak prior
+        stands in for them, and the covariance says so. An arm with four axes can only be calibrated so.
 
     Raises
     ------
     InputError
         Fewer than three usable views.
     DegenerateError
-        The views do not determine the answer; the message names what they leave open.
+        The views do not determine the answer, and it was not asked for reduced; the message names what they
+        leave open, the hint how to cure it.
     SolveError
         No minimum was found.
     """
-    return calibrate(Measurements.of_recording(recording), ModelName(model))
+    return calibrate(Measurements.of_recording(recording), ModelName(model), reduced=reduced)
 
 
-def calibrate(measurements: Measurements, model: ModelName = ModelName.AUTO) -> Calibration:
+def calibrate(
+    measurements: Measurements, model: ModelName = ModelName.AUTO, *, reduced: bool = False
+) -> Calibration:
     """Calibrate from measurements; see `solve`."""
     check_views(measurements)
-    closed_form_start(measurements)  # Refuses motions that leave something open, in words.
     estimate = make_estimator(model)(measurements)
-    if not estimate.determined:
-        raise DegenerateError(
-            "the views do not determine the hand-eye transform",
-            hint="add views with the camera turned about another axis",
-        )
+    if not estimate.determined and not reduced:
+        sentences = list(dict.fromkeys(direction.sentence for direction in estimate.unobservable))
+        raise DegenerateError("; ".join(sentences), hint=estimate.unobservable[0].cure)
     return to_calibration(measurements, estimate)
 
 
@@ -71,6 +81,7 @@ def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibratio
         model=estimate.model,
         start=estimate.start,
         views=tuple(views),
+        unobservable=estimate.unobservable,
         degrees_of_freedom=estimate.degrees_of_freedom,
     )
 

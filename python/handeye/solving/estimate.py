@@ -10,7 +10,7 @@ from handeye import _core
 from handeye.errors import DegenerateError
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import ModelName, Noise, RobotSide
+from handeye.types.calibration import ModelName, Noise, RobotSide, Unobservable
 from handeye.types.camera import Camera
 from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
@@ -89,8 +89,8 @@ class Estimate:
         Indices of the free camera parameters.
     candidate_sigma_px
         Pixel noise expected of a further view.
-    determined
-        Whether the views determine the answer without prior belief about X and Y.
+    unobservable
+        Directions of X and Y that the views leave open; a weak prior stands in for them.
     """
 
     mounting: Mounting
@@ -107,8 +107,13 @@ class Estimate:
     iterations: int
     candidate_sigma_px: float
     free_camera: tuple[int, ...] = ()
-    determined: bool = True
+    unobservable: tuple[Unobservable, ...] = ()
     degrees_of_freedom: float = float("inf")
+
+    @property
+    def determined(self) -> bool:
+        """Whether the views determine the answer without prior belief about X and Y."""
+        return not self.unobservable
 
     @property
     def entropy(self) -> float:

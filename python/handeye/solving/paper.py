@@ -7,6 +7,7 @@ from handeye.errors import DegenerateError, HandeyeError, SolveError
 from handeye.solving.estimate import Estimate, Hypothesis
 from handeye.solving.initialize import Start, check_views, closed_form_start, pose_start
 from handeye.solving.measurements import Measurements
+from handeye.solving.observability import undetermined
 from handeye.types.calibration import ModelName, Noise, RobotSide
 from handeye.types.pose import Pose
 
@@ -39,46 +40,43 @@ def paper_estimate(measurements: Measurements, previous: Estimate | None = None)
     """
     check_views(measurements)
     sigma = pixel_sigma(measurements)
-    model = _core.Model(np.full(len(measurements), sigma))
-    determined = True
-    starts: list[Start] = []
+    sigmas = np.full(len(measurements), sigma)
+    starts: list[Start] = [pose_start(measurements, previous)]
     try:
-        starts.append(closed_form_start(measurements))
+        starts.insert(0, closed_form_start(measurements))
+        solution, start = _best(measurements, _core.Model(sigmas), starts)
     except DegenerateError:
-        determined = False
-    starts.append(pose_start(measurements, previous))
-    solution, start = _best(measurements, model, starts)
-    if solution is None or not determined or solution.ending == "degenerate":
-        determined = False
-        weak = _core.Model(
-            np.full(len(measurements), sigma),
-            chain_prior=(np.eye(4), starts[-1].Y.matrix, WEAK_SIGMA_X, WEAK_SIGMA_Y),
-        )
-        solution, start = _best(measurements, weak, starts[-1:])
+        solution, start = None, ""
+    if solution is None or solution.ending == "degenerate":
+        anchor = starts[-1]
+        prior = (np.eye(4), anchor.Y.matrix, WEAK_SIGMA_X, WEAK_SIGMA_Y)
+        solution, start = _best(measurements, _core.Model(sigmas, chain_prior=prior), [anchor])
     if solution is None:
         raise SolveError(
             "the reprojection error could not be minimised from any start",
             code="diverged",
             hint="check that the poses belong to the images, and their units",
         )
+    X, Y = Pose(solution.x), Pose(solution.y)
+    noise = Noise(
+        (sigma,) * len(measurements), how="one pixel noise for all views, robot and camera taken as exact"
+    )
     belief = _core.Belief(solution.information)
     return Estimate(
         mounting=measurements.mounting,
         target=measurements.target,
-        X=Pose(solution.x),
-        Y=Pose(solution.y),
+        X=X,
+        Y=Y,
         camera=measurements.camera,
         covariance=belief.covariance,
         hypotheses=(Hypothesis(1.0, RobotSide.NONE, 0.0, 0.0, solution.information),),
-        noise=Noise(
-            (sigma,) * len(measurements), how="one pixel noise for all views, robot and camera taken as exact"
-        ),
+        noise=noise,
         model=ModelName.PAPER,
         start=start,
         ending=solution.ending,
         iterations=solution.iterations,
         candidate_sigma_px=sigma,
-        determined=determined,
+        unobservable=undetermined(measurements, X, Y, noise),
     )
 
 
