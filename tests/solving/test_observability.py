@@ -48,10 +48,7 @@ class TestDegenerate:
             assert len(reduced.unobservable) == 1, seed
             direction = np.array(reduced.unobservable[0].direction)
             own = reduced.X.rotation.T @ direction[:3]
-            if mounting is Mounting.EYE_IN_HAND:
-                known = axis
-            else:
-                known = poses[0].rotation @ axis
+            known = axis if mounting is Mounting.EYE_IN_HAND else poses[0].rotation @ axis
             assert abs(unit(own) @ known) > np.cos(np.deg2rad(3)), seed
 
     def test_pure_translation_is_named(self, model: ModelName, mounting: Mounting) -> None:

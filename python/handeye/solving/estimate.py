@@ -135,7 +135,8 @@ class Estimate:
         return self.covariance[:6, :6]
 
     @cached_property
-    def _averaged(self) -> tuple[tuple[float, Hypothesis], ...]:
+    def averaged(self) -> tuple[tuple[float, Hypothesis], ...]:
+        """The hypotheses that predictions are averaged over, with weights that sum to one."""
         chosen: list[tuple[float, Hypothesis]] = []
         mass = 0.0
         for hypothesis in self.hypotheses[:AVERAGED_COUNT]:
@@ -177,7 +178,7 @@ class Estimate:
             The information is singular.
         """
         total = np.zeros(len(motions))
-        for probability, hypothesis in self._averaged:
+        for probability, hypothesis in self.averaged:
             belief = _core.Belief(hypothesis.information)
             total += probability * self.predictor(hypothesis, sight).gains(belief, criterion, motions)
         return total

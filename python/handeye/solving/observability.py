@@ -1,8 +1,8 @@
 """What the views leave open, in words: null directions of the information, named in the user's frames.
 
 The information of X and Y without any prior belief is ``sum_k B_k' (sigma_k^2 M_k^-1 + S_k)^-1 B_k`` with
-``B_k = [I, Ad(X A_k)]``: what the images say of the chain, seen through the robot's noise. A direction that it
-knows worse than `UNDETERMINED` is not determined; a metre and a radian weigh alike there.
+``B_k = [I, Ad(X A_k)]``: what the images say of the chain, seen through the robot's noise. A direction that
+it knows worse than `UNDETERMINED` is not determined; a metre and a radian weigh alike there.
 """
 
 import numpy as np
@@ -113,8 +113,8 @@ def _translation(measurements: Measurements, X: Pose, direction: FloatArray, cur
     own = _axis_name(X.rotation.T @ direction[:3], camera)
     other = _axis_name(direction[6:9], target)
     return Unobservable(
-        f"the position of the camera along {own} is not determined: it trades with the position of the target "
-        f"along {other}",
+        f"the position of the camera along {own} is not determined: it trades with the position of the "
+        f"target along {other}",
         cure,
         _unit(direction),
     )
