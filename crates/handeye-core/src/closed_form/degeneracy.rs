@@ -149,7 +149,8 @@ impl AxisSpread {
                 deg(self.hand_spread_rad)
             );
         }
-        let axis = self.dominant_axis;
+        // No minus before a zero.
+        let axis = self.dominant_axis.map(|x| if x.abs() < 5e-4 { 0.0 } else { x });
         format!(
             "the rotation axes are parallel: all views turn about the axis ({:.3}, {:.3}, {:.3}) of the \
              flange frame (eye-in-hand) or base frame (eye-to-hand), by {:.3} deg rms, and about any other \

@@ -92,3 +92,43 @@ pub(super) fn rotation_of_unit_scale(m: &Matrix3<f64>) -> Result<Matrix3<f64>, E
          instead of 1; the translations of these views say too little about the scale"
     )))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Random;
+
+    #[test]
+    fn the_best_rotation_is_never_a_reflection() {
+        let mut random = Random::new(1);
+        for third in [0.3, 0.0, -0.3] {
+            let (u, v) = (random.transform(0.0, 2.0).rotation, random.transform(0.0, 2.0).rotation);
+            let sum = u * Matrix3::from_diagonal(&Vector3::new(2.0, 1.0, third)) * v.transpose();
+            let found = rotation_from_correlation(&sum).unwrap();
+            assert!((found - u * v.transpose()).amax() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn what_two_rotations_fit_equally_is_refused() {
+        for third in [-1.0, -1.0 + 1e-12] {
+            let sum = Matrix3::from_diagonal(&Vector3::new(2.0, 1.0, third));
+            assert!(matches!(rotation_from_correlation(&sum), Err(Error::Degenerate { .. })));
+        }
+        let line = Matrix3::from_diagonal(&Vector3::new(2.0, 0.0, 0.0));
+        assert!(matches!(rotation_from_correlation(&line), Err(Error::Degenerate { .. })));
+        assert!(rotation_from_correlation(&Matrix3::zeros()).is_err());
+        assert!(rotation_from_correlation(&(line * f64::NAN)).is_err());
+    }
+
+    #[test]
+    fn a_matrix_far_from_a_rotation_is_not_taken_for_one() {
+        let r = Random::new(2).transform(0.0, 2.0).rotation;
+        assert!((rotation_of_unit_scale(&(r * 0.9)).unwrap() - r).amax() < 1e-13);
+        assert!((rotation_of_either_sign(&(r * -0.01)).unwrap() - r).amax() < 1e-13);
+        for bad in [r * 0.1, r * -1.0, r * 3.0, r * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.1))] {
+            assert!(matches!(rotation_of_unit_scale(&bad), Err(Error::Numerical { .. })));
+        }
+        assert!(rotation_of_either_sign(&Matrix3::from_element(1.0)).is_err());
+    }
+}
