@@ -16,8 +16,8 @@ def make_app() -> App:
         name="handeye",
         help="Hand-eye calibration that says which view to take next, when to stop, and how far to trust it.",
         help_format="plaintext",
-        help_epilogue="handeye COMMAND --help explains a command. Exit codes: 0 good, 1 mistake in handeye, 2 usage, "
-        "3 unusable input, 4 degenerate geometry, 5 failed detection, 6 not solved, 7 cannot write, "
+        help_epilogue="handeye COMMAND --help explains a command. Exit codes: 0 good, 1 mistake in handeye, "
+        "2 usage, 3 unusable input, 4 degenerate geometry, 5 failed detection, 6 not solved, 7 cannot write, "
         "130 interrupted.",
         version=version,
         result_action="return_value",

@@ -3,6 +3,7 @@
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.planner import Planner, PlannerOptions, Proposal, Verdict, replay
 from handeye.planning.policies import POLICIES, Policy, make_policy
+from handeye.planning.ranking import Prospect, Ranking, rank
 from handeye.planning.stopping import Accuracy, GainThreshold, NumberOfViews, Stop, StopReason, StopRule
 
 __all__ = [
@@ -16,10 +17,13 @@ __all__ = [
     "Policy",
     "Pool",
     "Proposal",
+    "Prospect",
+    "Ranking",
     "Stop",
     "StopReason",
     "StopRule",
     "Verdict",
     "make_policy",
+    "rank",
     "replay",
 ]

@@ -1,0 +1,131 @@
+"""Candidates in order of what they would teach, what is predicted after each, and why others cannot serve.
+
+The prediction needs no image: the information of a candidate is known before it is taken. Under each
+hypothesis about the robot's noise the covariance falls from the inverse of `Lambda` to that of `Lambda + I`
+(paper, section IV). The averages of the two say by what share it falls, and that share is applied to the
+covariance of the estimate, which also holds what the averaging adds.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handeye import _core
+from handeye.planning.candidates import Candidate, Pool
+from handeye.planning.visibility import obstacles
+from handeye.solving.estimate import Estimate, Sight
+from handeye.types.arrays import FloatArray
+
+# Candidates whose covariances are held in memory at a time.
+_BATCH = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Prospect:
+    """What is expected of one candidate.
+
+    Parameters
+    ----------
+    candidate
+        The robot pose.
+    gain
+        Gain by the criterion that was asked for.
+    covariance
+        (6, 6) covariance of the twist of X predicted after it.
+    """
+
+    candidate: Candidate
+    gain: float
+    covariance: FloatArray
+
+    @property
+    def sigma_translation_m(self) -> float:
+        """Predicted standard deviation of the camera's position: root of the sum of the three variances."""
+        return float(np.sqrt(np.trace(self.covariance[:3, :3])))
+
+    @property
+    def sigma_rotation_rad(self) -> float:
+        """Predicted standard deviation of the camera's rotation: root of the sum of the three variances."""
+        return float(np.sqrt(np.trace(self.covariance[3:, 3:])))
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """All candidates of a pool.
+
+    Parameters
+    ----------
+    prospects
+        Feasible candidates, the best first; at most as many as were asked for.
+    infeasible
+        Name of each candidate that cannot be used, and why.
+    feasible_count
+        Number of feasible candidates, also those beyond the number asked for.
+    """
+
+    prospects: tuple[Prospect, ...]
+    infeasible: dict[str, str]
+    feasible_count: int
+
+
+def rank(
+    estimate: Estimate,
+    pool: Pool,
+    criterion: _core.Criterion,
+    sight: Sight | None = None,
+    *,
+    top: int | None = None,
+) -> Ranking:
+    """Rank the candidates of a pool by gain; the first of equals stays first.
+
+    Parameters
+    ----------
+    estimate
+        What is believed now.
+    pool
+        Candidates.
+    criterion
+        What a view is worth.
+    sight
+        What a candidate must show of the target.
+    top
+        Number of prospects wanted; None for all.
+    """
+    sight = sight or Sight()
+    if len(pool) == 0:
+        return Ranking((), {}, 0)
+    motions = pool.motions(estimate.mounting)
+    hidden = obstacles(estimate, motions, sight)
+    gains = estimate.gains(criterion, motions, sight)
+    infeasible = {
+        candidate.name: why or "the gain cannot be computed"
+        for candidate, why, gain in zip(pool.candidates, hidden, gains, strict=True)
+        if why is not None or np.isnan(gain)
+    }
+    usable = np.array([why is None for why in hidden]) & ~np.isnan(gains)
+    order = [
+        int(i) for i in np.argsort(-np.where(usable, gains, -np.inf), kind="stable")[: int(usable.sum())]
+    ]
+    chosen = order[:top]
+    covariances = predicted_covariances(estimate, motions[chosen], sight)
+    prospects = tuple(
+        Prospect(pool.candidates[i], float(gains[i]), covariance)
+        for i, covariance in zip(chosen, covariances, strict=True)
+    )
+    return Ranking(prospects, infeasible, int(usable.sum()))
+
+
+def predicted_covariances(estimate: Estimate, motions: FloatArray, sight: Sight) -> FloatArray:
+    """(N, 6, 6) covariance of the twist of X predicted after a view at each of motions (N, 4, 4)."""
+    before = np.zeros((6, 6))
+    after = np.zeros((len(motions), 6, 6))
+    for weight, hypothesis in estimate.averaged:
+        predictor = estimate.predictor(hypothesis, sight)
+        before += weight * np.linalg.inv(hypothesis.information)[:6, :6]
+        for first in range(0, len(motions), _BATCH):
+            batch = slice(first, first + _BATCH)
+            information = hypothesis.information + predictor.informations(motions[batch])
+            after[batch] += weight * np.linalg.inv(information)[:, :6, :6]
+    root = np.linalg.cholesky(estimate.hand_eye_covariance)
+    share = root @ np.linalg.inv(np.linalg.cholesky(before))
+    return share @ after @ share.T
