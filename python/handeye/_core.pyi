@@ -330,3 +330,31 @@ class Posterior:
     @property
     def hypotheses(self) -> list[tuple[str, float, float, float]]: ...
     def information(self, rank: int) -> NDArray[float64]: ...
+
+# Several views at once
+
+def select_views(
+    base: ArrayLike,
+    informations: ArrayLike,
+    k: int,
+    objective: str,
+    *,
+    tool_points: ArrayLike | None = None,
+) -> tuple[list[int], float]:
+    """Choose k of a pool (N, n, n) on top of `base` (n, n), greedily and by exchange; indices and their worth.
+
+    `objective`: entropy, entropy_handeye, or tool_point with points (P, 3) in the camera frame. Worth is
+    `ln |Lambda|`, `ln |Lambda| - ln |Lambda_nn|`, or minus the mean variance in square metres.
+    """
+
+def certify_views(
+    base: ArrayLike,
+    informations: ArrayLike,
+    chosen: list[int],
+    objective: str,
+    *,
+    tool_points: ArrayLike | None = None,
+    iterations: int = 300,
+    tolerance: float = 1e-4,
+) -> tuple[float, float, float]:
+    """Worth of a choice, a bound that no choice of as many views exceeds, and the efficiency between them."""

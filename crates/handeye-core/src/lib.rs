@@ -10,6 +10,7 @@ pub mod evidence;
 pub mod information;
 pub mod least_squares;
 pub mod planar_pose;
+pub mod planning;
 pub mod pose;
 pub mod se3;
 pub mod testing;

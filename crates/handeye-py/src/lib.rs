@@ -15,6 +15,7 @@ mod geometry;
 mod information;
 mod model;
 mod planar_pose;
+mod planning;
 mod problem;
 
 #[pymodule]
@@ -24,6 +25,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     evidence::register(module)?;
     geometry::register(module)?;
     planar_pose::register(module)?;
+    planning::register(module)?;
     problem::register(module)?;
     model::register(module)?;
     information::register(module)?;

@@ -1,0 +1,115 @@
+//! What a set of views is worth: concave functions of the information, with their gradients.
+
+use nalgebra::{DMatrix, Matrix3x6, Vector3};
+
+use crate::error::Error;
+use crate::se3::hat;
+
+/// A concave function `phi` of the information; larger is better.
+#[derive(Clone, Debug)]
+pub enum Objective {
+    /// `ln |Lambda|`: entropy of all parameters, doubled and negated.
+    Entropy,
+    /// `ln |Lambda| - ln |Lambda_nn|`: entropy of the hand-eye alone, doubled and negated.
+    EntropyHandEye,
+    /// `-tr(Q Sigma)`: mean variance of tool points, negated; `Q` acts on the hand-eye's twist.
+    ToolPoint(DMatrix<f64>),
+}
+
+impl Objective {
+    /// Mean variance of points in the camera frame (metres) mapped through `X`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidInput`] without points.
+    pub fn tool_points(points: &[Vector3<f64>]) -> Result<Self, Error> {
+        if points.is_empty() {
+            return Err(Error::invalid("tool points: at least one"));
+        }
+        let mut q = DMatrix::zeros(6, 6);
+        for p in points {
+            let mut j = Matrix3x6::zeros();
+            j.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+            j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-hat(p));
+            q += j.transpose() * j / points.len() as f64;
+        }
+        Ok(Self::ToolPoint(q))
+    }
+
+    /// `phi` of an information; `None` if it is not positive definite.
+    pub fn value(&self, information: &DMatrix<f64>) -> Option<f64> {
+        match self {
+            Self::Entropy => log_determinant(information),
+            Self::EntropyHandEye => {
+                Some(log_determinant(information)? - log_determinant(&nuisance(information))?)
+            }
+            Self::ToolPoint(q) => {
+                let covariance = inverse(information)?;
+                Some(-(q * covariance.view((0, 0), (6, 6))).trace())
+            }
+        }
+    }
+
+    /// `phi` and its gradient, a positive semi-definite matrix `G` with `d phi = tr(G d Lambda)`.
+    pub(super) fn gradient(&self, information: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
+        let n = information.nrows();
+        let covariance = inverse(information)?;
+        match self {
+            Self::Entropy => Some((log_determinant(information)?, covariance)),
+            Self::EntropyHandEye => {
+                let rest = nuisance(information);
+                let value = log_determinant(information)? - log_determinant(&rest)?;
+                let mut gradient = covariance;
+                let mut block = gradient.view_mut((6, 6), (n - 6, n - 6));
+                block -= inverse(&rest)?;
+                Some((value, gradient))
+            }
+            Self::ToolPoint(q) => {
+                let columns = covariance.columns(0, 6).into_owned();
+                let value = -(q * covariance.view((0, 0), (6, 6))).trace();
+                Some((value, &columns * q * columns.transpose()))
+            }
+        }
+    }
+
+    /// How good `chosen` is against `best`, both values of `phi`, as a share of the best: the D-efficiency for
+    /// entropies (per parameter), the ratio of standard deviations for tool points.
+    pub fn efficiency(&self, chosen: f64, best: f64, parameters: usize) -> f64 {
+        match self {
+            Self::Entropy => ((chosen - best) / parameters as f64).exp(),
+            Self::EntropyHandEye => ((chosen - best) / 6.0).exp(),
+            Self::ToolPoint(_) => (best / chosen).max(0.0).sqrt(),
+        }
+    }
+}
+
+fn nuisance(information: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = information.nrows() - 6;
+    information.view((6, 6), (n, n)).into_owned()
+}
+
+/// Cholesky of the matrix scaled to a unit diagonal, and the scales.
+fn scaled(m: &DMatrix<f64>) -> Option<(nalgebra::Cholesky<f64, nalgebra::Dyn>, Vec<f64>)> {
+    let n = m.nrows();
+    if (0..n).any(|i| m[(i, i)] <= 0.0 || !m[(i, i)].is_finite()) {
+        return None;
+    }
+    let scale: Vec<f64> = (0..n).map(|i| m[(i, i)].sqrt().recip()).collect();
+    let factor = DMatrix::from_fn(n, n, |i, j| m[(i, j)] * scale[i] * scale[j]).cholesky()?;
+    Some((factor, scale))
+}
+
+fn log_determinant(m: &DMatrix<f64>) -> Option<f64> {
+    let (factor, scale) = scaled(m)?;
+    Some(2.0 * (0..m.nrows()).map(|i| factor.l_dirty()[(i, i)].ln() - scale[i].ln()).sum::<f64>())
+}
+
+fn inverse(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let (factor, scale) = scaled(m)?;
+    let mut inverse = factor.inverse();
+    for i in 0..m.nrows() {
+        for j in 0..m.nrows() {
+            inverse[(i, j)] *= scale[i] * scale[j];
+        }
+    }
+    Some(inverse)
+}
