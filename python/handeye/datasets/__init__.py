@@ -7,6 +7,7 @@ a `Recording`, ready to be solved.
 from handeye.datasets.image_set import ImageSet, ImportOptions, Shot
 from handeye.datasets.importer import Importer
 from handeye.datasets.loading import IMPORTERS, load
+from handeye.datasets.parameter_files import read_camera, read_target
 from handeye.datasets.plausibility import DataWarning, recording_warnings
 from handeye.datasets.poses_csv import PoseTable, read_poses_csv
 from handeye.datasets.recording_format import LoadedRecording, read_recording, write_recording
@@ -21,8 +22,10 @@ __all__ = [
     "PoseTable",
     "Shot",
     "load",
+    "read_camera",
     "read_poses_csv",
     "read_recording",
+    "read_target",
     "recording_warnings",
     "write_recording",
 ]
