@@ -65,9 +65,7 @@ pub fn planar_pose(
         .ok()
         .filter(|other| rotation_between(other, &first) > SAME_ROTATION_RAD);
     Ok(match second {
-        Some(second) if second.rmse_px < first.rmse_px => {
-            PlanarPose { best: second, mirrored: Some(first) }
-        }
+        Some(second) if second.rmse_px < first.rmse_px => PlanarPose { best: second, mirrored: Some(first) },
         second => PlanarPose { best: first, mirrored: second },
     })
 }

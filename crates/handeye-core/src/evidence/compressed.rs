@@ -42,8 +42,10 @@ pub fn compress(
     pose: &Se3,
     parameters: Option<&PixelParameters>,
 ) -> Result<CompressedView, Error> {
-    let block = view_block(problem, k, camera, 0.0, pose, 1.0, parameters, Loss::Squared)
-        .ok_or_else(|| Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image")))?;
+    let block =
+        view_block(problem, k, camera, 0.0, pose, 1.0, parameters, Loss::Squared).ok_or_else(|| {
+            Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
+        })?;
     let covariance = block
         .m
         .cholesky()

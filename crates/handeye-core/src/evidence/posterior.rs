@@ -191,12 +191,7 @@ fn prepare(views: &[&CompressedView], variances: &[f64], x: &Se3, y: &Se3) -> Ve
             rows.view_mut((0, 6), (6, 6)).copy_from(&to_y);
             rows.view_mut((0, 12), (6, n_c)).copy_from(&view.sensitivity);
             rows.set_column(12 + n_c, &error);
-            View {
-                rows,
-                pixel_covariance: view.covariance * *variance,
-                left: x.adjoint(),
-                right: to_y,
-            }
+            View { rows, pixel_covariance: view.covariance * *variance, left: x.adjoint(), right: to_y }
         })
         .collect()
 }

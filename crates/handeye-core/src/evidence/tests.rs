@@ -15,7 +15,8 @@ fn compressed(cell: &Cell, reported: &[Se3], sigma_px: f64, seed: u64) -> Vec<Co
         .map(|k| {
             let range = problem.samples(k);
             let pose =
-                planar_pose(&cell.camera, &problem.features()[range.clone()], &problem.pixels()[range]).unwrap();
+                planar_pose(&cell.camera, &problem.features()[range.clone()], &problem.pixels()[range])
+                    .unwrap();
             compress(&problem, k, &cell.camera, &pose.best.t_camera_target, None).unwrap()
         })
         .collect()
@@ -72,12 +73,8 @@ fn sides_and_levels_are_told_apart() {
         let noise = truth.map(|side| RobotNoise::isotropic(side, 1e-3, 2e-3));
         let views = compressed(&cell, &noisy(&cell, noise.as_ref(), seed), 0.1, seed);
         let posterior = run(&views);
-        let probability: f64 = hypotheses
-            .iter()
-            .zip(&posterior.weights)
-            .filter(|(h, _)| h.side == truth)
-            .map(|(_, w)| w)
-            .sum();
+        let probability: f64 =
+            hypotheses.iter().zip(&posterior.weights).filter(|(h, _)| h.side == truth).map(|(_, w)| w).sum();
         assert!(probability > 0.9, "{truth:?}: {probability}");
         if truth.is_some() {
             let level: f64 = hypotheses
