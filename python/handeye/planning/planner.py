@@ -57,13 +57,32 @@ class Verdict:
 
 @dataclass(frozen=True)
 class PlannerOptions:
-    """How to choose and when to stop."""
+    """How to choose and when to stop.
+
+    Parameters
+    ----------
+    policy
+        Chooses among the feasible candidates.
+    criterion
+        What a view is worth.
+    stop_rules
+        Asked in this order before every proposal.
+    sight
+        What a candidate must show of the target.
+    seed
+        Of the planner's own chance.
+    young_sigma_m
+        While the standard deviation of the camera's position lies between these two, gains are averaged over
+        sigma points of X and Y; beyond the second nothing can be predicted, below the first nothing changes.
+        None to take the estimate at its word.
+    """
 
     policy: Policy = field(default_factory=NextBestView)
     criterion: _core.Criterion = field(default_factory=lambda: _core.Criterion("entropy"))
     stop_rules: tuple[StopRule, ...] = ()
     sight: Sight = field(default_factory=Sight)
     seed: int = 0
+    young_sigma_m: tuple[float, float] | None = None
 
 
 class Planner:
@@ -121,7 +140,16 @@ class Planner:
         if len(self._pool) == 0:
             return np.zeros(0)
         motions = self._pool.motions(self._measurements.mounting)
-        return self._estimate.gains(self._options.criterion, motions, self._options.sight)
+        return self._estimate.gains(
+            self._options.criterion, motions, self._options.sight, over_posterior=self._is_young()
+        )
+
+    def _is_young(self) -> bool:
+        limits = self._options.young_sigma_m
+        if limits is None:
+            return False
+        sigma = float(np.sqrt(np.trace(self._estimate.hand_eye_covariance[:3, :3])))
+        return limits[0] < sigma < limits[1]
 
     def ask(self) -> Proposal | Stop:
         """Propose the next view, or say why there is none to take."""

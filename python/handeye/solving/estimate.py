@@ -1,6 +1,6 @@
 """What is believed after some views: the values that planning and reporting build on."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -19,6 +19,8 @@ from handeye.types.target import Target
 # Hypotheses about the robot's noise that a gain is averaged over: the likeliest, up to this share and number.
 AVERAGED_SHARE = 0.95
 AVERAGED_COUNT = 12
+# Least known directions of X and Y along which sigma points are laid, a metre and a radian weighing alike.
+SIGMA_POINT_DIRECTIONS = 4
 
 
 @dataclass(frozen=True)
@@ -167,21 +169,60 @@ class Estimate:
             fewest=1 if sight.known else sight.fewest or self.target.point_count,
         )
 
-    def gains(self, criterion: _core.Criterion, motions: FloatArray, sight: Sight) -> FloatArray:
+    def gains(
+        self,
+        criterion: _core.Criterion,
+        motions: FloatArray,
+        sight: Sight,
+        *,
+        over_posterior: bool = False,
+    ) -> FloatArray:
         """(N,) gain of candidate views at `motions` (N, 4, 4), averaged over what the robot's noise may be.
 
         NaN where too little of the target would be in sight.
+
+        Parameters
+        ----------
+        criterion
+            What a view is worth.
+        motions
+            A of the chain of each candidate.
+        sight
+            What a candidate must show.
+        over_posterior
+            Average over sigma points of X and Y as well: a young estimate is wrong, and a view must be worth
+            taking wherever the truth may be. Where a sigma point does not show the target it gains nothing.
 
         Raises
         ------
         DegenerateError
             The information is singular.
         """
+        gains = self._gains_at(criterion, motions, sight)
+        if not over_posterior:
+            return gains
+        points = [gains]
+        for X, Y in self._sigma_points():
+            moved = replace(self, X=X, Y=Y)
+            points.append(np.nan_to_num(moved._gains_at(criterion, motions, sight)))
+        return np.mean(points, axis=0)
+
+    def _gains_at(self, criterion: _core.Criterion, motions: FloatArray, sight: Sight) -> FloatArray:
         total = np.zeros(len(motions))
         for probability, hypothesis in self.averaged:
             belief = _core.Belief(hypothesis.information)
             total += probability * self.predictor(hypothesis, sight).gains(belief, criterion, motions)
         return total
+
+    def _sigma_points(self) -> list[tuple[Pose, Pose]]:
+        """X and Y on both sides along the least known directions (unscented transform, no central weight)."""
+        values, vectors = np.linalg.eigh(self.covariance[:12, :12])
+        points: list[tuple[Pose, Pose]] = []
+        for value, vector in list(zip(values, vectors.T, strict=True))[-SIGMA_POINT_DIRECTIONS:]:
+            step = np.sqrt(SIGMA_POINT_DIRECTIONS * max(float(value), 0.0)) * vector
+            for signed in (step, -step):
+                points.append((Pose.exp(signed[:6]) @ self.X, Pose.exp(signed[6:]) @ self.Y))
+        return points
 
 
 class Estimator(Protocol):
