@@ -40,7 +40,7 @@ test: check ## everything: the checks, the Rust tests, the Python tests, every e
 	$(say) 'cargo test'
 	@cargo test --workspace --locked --quiet
 	$(say) 'pytest'
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 check: build $(STAMPS)/dev ## format, lint, types, import directions
 	$(say) 'cargo fmt --check'
