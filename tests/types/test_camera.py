@@ -86,6 +86,7 @@ def test_fourteen_coefficients_without_tilt_are_twelve() -> None:
         {"parameters": [-1000, 1000, 640, 480]},
         {"parameters": [1000, 0, 640, 480]},
         {"parameters": [1000, math.nan, 640, 480]},
+        {"parameters": [1e300, 1000, 640, 480]},
         {"width_px": 0},
         {"width_px": 640.5},
         {"height_px": 10**9},

@@ -70,6 +70,21 @@ def test_copies_are_equal_to_the_last_bit(T: Pose) -> None:
         assert hash(twin) == hash(T)
 
 
+def test_a_matrix_rigid_to_rounding_is_kept_bit_for_bit() -> None:
+    for wobble in (1e-13, -3e-14):
+        matrix = GENERIC.matrix + wobble * np.eye(4)[:, [3, 0, 1, 2]] * [[1], [1], [1], [0]]
+        np.testing.assert_array_equal(Pose(matrix).matrix, matrix)
+
+
+@pytest.mark.parametrize(
+    "axis", [[1, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 0, -1], [-0.6, 0, 0.8], [0.6, -0.8, 0]]
+)
+@pytest.mark.parametrize("angle", [0.0, 1.0, 2.2, 3.0])
+def test_quaternions_have_a_positive_real_part(axis: list[float], angle: float) -> None:
+    q = Pose.exp([0, 0, 0, *(angle * np.array(axis))]).quaternion_xyzw
+    np.testing.assert_allclose(q, [*(np.sin(angle / 2) * np.array(axis)), np.cos(angle / 2)], atol=1e-12)
+
+
 def test_different_poses_differ() -> None:
     assert Pose.identity() != GENERIC
     assert "0.3" not in repr(Pose.identity())
@@ -117,7 +132,9 @@ def test_a_pose_does_not_mix_with_arrays() -> None:
         (np.diag([1.0, 1.0, 1.0, 2.0]), "not_rigid"),
         (np.eye(4) + 0.01 * np.eye(4, k=1), "not_rigid"),
         (np.zeros((4, 4)), "not_rigid"),
-        (np.full((4, 4), 1e308), "not_rigid"),
+        (np.full((4, 4), 1e308), "out_of_range"),
+        (np.eye(4) + 1e10 * np.eye(4, k=3), "out_of_range"),
+        (np.diag([1e200, -1e200, 1e200, 1.0]), "not_rigid"),
         (np.full((4, 4), np.nan), "not_finite"),
         (np.where(np.eye(4, k=3) > 0, np.inf, np.eye(4)), "not_finite"),
         (np.eye(3), "wrong_shape"),
@@ -150,5 +167,24 @@ def test_written_quaternions_are_normalised() -> None:
 @given(plain_values())
 def test_hostile_values_raise_only_our_error(value: Any) -> None:
     for construct in (Pose, Pose.exp, lambda v: Pose.from_quaternion([0, 0, 0], v)):
-        with pytest.raises(InputError):
-            construct(value)
+        try:
+            pose = construct(value)
+        except InputError:
+            continue
+        np.testing.assert_allclose(pose.rotation.T @ pose.rotation, np.eye(3), atol=1e-12)
+
+
+@given(poses(angle_rad=np.pi))
+def test_roll_pitch_yaw_agrees_with_scipy(T: Pose) -> None:
+    again = Rotation.from_euler("xyz", T.roll_pitch_yaw_rad).as_matrix()
+    np.testing.assert_allclose(again, T.rotation, atol=1e-8)
+
+
+@pytest.mark.parametrize("pitch", [-np.pi / 2, np.pi / 2])
+def test_roll_pitch_yaw_at_the_end_of_pitch(pitch: float) -> None:
+    rotation = Rotation.from_euler("xyz", [0.3, pitch, -0.8]).as_matrix()
+    T = Pose([[*row, 0] for row in rotation] + [[0, 0, 0, 1]])
+    assert T.roll_pitch_yaw_rad[0] == 0
+    np.testing.assert_allclose(
+        Rotation.from_euler("xyz", T.roll_pitch_yaw_rad).as_matrix(), rotation, atol=1e-8
+    )

@@ -11,6 +11,9 @@ from handeye.errors import InputError
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
+# No length or parameter is larger; squares and products of such numbers still are numbers.
+LARGEST = 1e9
+
 
 def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> FloatArray:
     """Copy `values` into a read-only float64 array of the given shape.
@@ -88,16 +91,18 @@ def count(value: SupportsIndex, low: int, high: int, what: str) -> int:
 
 
 def positive(value: float, what: str) -> float:
-    """Return `value` as a finite float above zero.
+    """Return `value` as a float above zero and at most 1e9.
 
     Raises
     ------
     InputError
-        Not a number, not finite, or not above zero.
+        Not a number, not finite, or outside the range.
     """
     number = float(finite_array(value, (), what))
-    if number <= 0.0:
-        raise InputError(f"{what}: {number}, expected a number above zero", code="out_of_range")
+    if not 0.0 < number <= LARGEST:
+        raise InputError(
+            f"{what}: {number}, expected a number above zero to {LARGEST:g}", code="out_of_range"
+        )
     return number
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from handeye import _core
 from handeye.errors import InputError
-from handeye.types.arrays import FloatArray, count, finite_array
+from handeye.types.arrays import LARGEST, FloatArray, count, finite_array
 from handeye.types.plain import Document, read_document, without_none
 
 _K = ("fx", "fy", "cx", "cy")
@@ -89,6 +89,8 @@ class Camera:
                 f"camera: {len(values)} parameters for {lens}, expected {len(names)}: {', '.join(names)}",
                 code="wrong_shape",
             )
+        if np.abs(values).max() > LARGEST:
+            raise InputError(f"camera: a parameter of {np.abs(values).max():.3g}", code="out_of_range")
         if min(values[:2]) <= 0:
             raise InputError(f"camera: focal lengths {values[:2]}, expected above zero", code="out_of_range")
         _set(self, "lens", lens)
@@ -234,9 +236,10 @@ def _covariance(values: ArrayLike, n: int) -> FloatArray:
     # Scaled to a correlation first: pixels squared and squared coefficients differ by ten orders of
     # magnitude.
     deviations = np.sqrt(np.clip(np.diag(covariance), 0, None))
-    correlation = covariance / np.outer(
-        np.where(deviations > 0, deviations, 1), np.where(deviations > 0, deviations, 1)
-    )
-    if np.diag(covariance).min() < 0 or np.linalg.eigvalsh(correlation).min() < -1e-6:
+    scales = np.where(deviations > 0, deviations, 1.0)
+    with np.errstate(all="ignore"):
+        correlation = covariance / scales / scales[:, np.newaxis]
+    usable = np.diag(covariance).min() >= 0 and bool(np.isfinite(correlation).all())
+    if not usable or np.linalg.eigvalsh(correlation).min() < -1e-6:
         raise InputError("camera: covariance is not positive semidefinite", code="invalid_field")
     return covariance

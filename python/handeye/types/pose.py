@@ -4,6 +4,7 @@
 ``T_base_flange @ T_flange_camera`` is ``T_base_camera``.
 """
 
+import math
 from typing import final
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from handeye import _core
 from handeye.errors import InputError
-from handeye.types.arrays import FloatArray, finite_array
+from handeye.types.arrays import LARGEST, FloatArray, finite_array
 
 # Below this deviation from a rotation a matrix is kept bit for bit, so that writing and reading change
 # nothing.
@@ -34,7 +35,8 @@ class Pose:
     Raises
     ------
     InputError
-        Not (4, 4), an entry that is not finite, or not rigid: scaled, sheared, mirrored, another last row.
+        Not (4, 4), an entry that is not finite, not rigid (scaled, sheared, mirrored, another last row), or a
+        translation of more than 1e9 m.
     """
 
     __slots__ = ("_matrix",)
@@ -45,7 +47,10 @@ class Pose:
 
     def __init__(self, matrix: ArrayLike) -> None:
         given = finite_array(matrix, (4, 4), "pose")
-        if np.linalg.det(given[:3, :3]) < 0:
+        farthest = float(np.abs(given[:3, 3]).max())
+        if farthest > LARGEST:
+            raise InputError(f"pose: a translation of {farthest:.3g} m", code="out_of_range")
+        if np.abs(given[:3, :3]).max() < 2 and np.linalg.det(given[:3, :3]) < 0:
             raise InputError(
                 "pose: a mirrored (left-handed) frame is not a rigid transform",
                 code="not_rigid",
@@ -93,7 +98,7 @@ class Pose:
         """
         translation = finite_array(translation_m, (3,), "translation")
         quaternion = finite_array(quaternion_xyzw, (4,), "quaternion")
-        norm = float(np.linalg.norm(quaternion))
+        norm = math.hypot(*quaternion)
         if not abs(norm - 1.0) <= QUATERNION_NORM_TOLERANCE:
             raise InputError(
                 f"quaternion: norm {norm:.6g}, expected 1",
@@ -140,6 +145,19 @@ class Pose:
         )
         quaternion = candidates[int(np.argmax(np.diag(candidates)))]
         return quaternion / np.linalg.norm(quaternion) * (-1.0 if quaternion[3] < 0 else 1.0)
+
+    @property
+    def roll_pitch_yaw_rad(self) -> FloatArray:
+        """(3,) angles about the fixed axes x, y and z, as in URDF: `R = Rz(yaw) Ry(pitch) Rx(roll)`.
+
+        Pitch lies in -pi/2 to pi/2; where it is at either end, roll is zero.
+        """
+        r = self.rotation
+        cosine = float(np.hypot(r[0, 0], r[1, 0]))
+        pitch = np.arctan2(-r[2, 0], cosine)
+        if cosine < 1e-9:
+            return np.array([0.0, pitch, np.arctan2(-r[0, 1], r[1, 1])])
+        return np.array([np.arctan2(r[2, 1], r[2, 2]), pitch, np.arctan2(r[1, 0], r[0, 0])])
 
     @property
     def rotation_angle_rad(self) -> float:

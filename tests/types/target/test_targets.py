@@ -115,6 +115,7 @@ def test_dict_reads_back_and_arrays_are_frozen(target: Target) -> None:
         (GOOD[0], {"rows": 1000, "columns": 1000}),
         (GOOD[0], {"pitch_m": 0}),
         (GOOD[0], {"pitch_m": float("inf")}),
+        (GOOD[0], {"pitch_m": 1e200}),
         (GOOD[0], {"pitch_mm": 25}),
         (GOOD[0], {"family": "checkers"}),
         (GOOD[0], {"family": None}),
