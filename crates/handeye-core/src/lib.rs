@@ -13,4 +13,5 @@ pub mod planar_pose;
 pub mod planning;
 pub mod pose;
 pub mod se3;
+pub mod simd;
 pub mod testing;

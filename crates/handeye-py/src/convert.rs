@@ -1,6 +1,9 @@
 //! numpy to nalgebra and back, with shape checks that name the argument.
 //!
-//! Everything is copied on the way in, so that the interpreter lock can be released afterwards.
+//! Everything is copied on the way in, so that the interpreter lock can be released afterwards; only long arrays that
+//! are read once ([`row_major`]) stay where they are.
+
+use std::borrow::Cow;
 
 use handeye_core::se3::Se3;
 use nalgebra::{Matrix4, SMatrix, SVector};
@@ -71,6 +74,21 @@ pub fn matrix<const R: usize, const C: usize>(
 /// One rigid transform out of a `(4, 4)` array.
 pub fn transform(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Se3> {
     rigid(py, name, &matrix::<4, 4>(py, name, array)?)
+}
+
+/// Entries of an `(N, R, C)` array in row-major order, in place where they lie that way.
+///
+/// In place they are read while the interpreter lock is released, as numpy itself does.
+pub fn row_major<'a, const R: usize, const C: usize>(
+    py: Python<'_>,
+    name: &str,
+    array: &'a Array<'_>,
+) -> PyResult<Cow<'a, [f64]>> {
+    check_shape(py, name, array, &[None, Some(R), Some(C)])?;
+    Ok(match array.as_slice() {
+        Ok(entries) => Cow::Borrowed(entries),
+        Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
+    })
 }
 
 /// Rigid transforms out of an `(N, 4, 4)` array; an error names the index.

@@ -1,10 +1,12 @@
 //! Entropy, gains and predicted information of candidates.
 
+use handeye_core::error::Error;
 use handeye_core::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, ToolPoint, Trace,
 };
-use handeye_core::information::{Belief as CoreBelief, CandidateModel, Sight};
+use handeye_core::information::{Belief as CoreBelief, CandidateModel, Execution, Motions, Sight};
 use handeye_core::least_squares::PixelParameters;
+use handeye_core::simd::VectorUnit;
 use nalgebra::DMatrix;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -121,6 +123,21 @@ impl PyCriterion {
     }
 }
 
+fn vector_unit(py: Python<'_>, name: &str) -> PyResult<VectorUnit> {
+    VectorUnit::ALL
+        .into_iter()
+        .find(|unit| unit.name() == name)
+        .filter(|unit| unit.is_available())
+        .ok_or_else(|| {
+            let names: Vec<&str> = VectorUnit::ALL
+                .into_iter()
+                .filter(|unit| unit.is_available())
+                .map(VectorUnit::name)
+                .collect();
+            invalid(py, &format!("vector_unit must be one of {}, found \"{name}\"", names.join(", ")))
+        })
+}
+
 /// Predicts what candidate views would tell.
 #[pyclass(frozen, module = "handeye._core")]
 pub struct Predictor {
@@ -205,18 +222,36 @@ impl Predictor {
     }
 
     /// Gain of each candidate motion; NaN where too little would be in sight.
+    ///
+    /// Results do not depend on `threads` (0: as many as pay off) and on `vector_unit` beyond rounding.
+    #[pyo3(signature = (belief, criterion, motions, *, threads=0, vector_unit=None))]
     fn gains<'py>(
         &self,
         py: Python<'py>,
         belief: &Belief,
         criterion: &PyCriterion,
         motions: Array<'py>,
+        threads: usize,
+        vector_unit: Option<&str>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let motions = convert::transforms(py, "motions", &motions)?;
-        let gains = py
-            .detach(|| self.model().gains(&belief.inner, criterion.inner.as_ref(), &motions))
-            .map_err(|e| to_python(py, e))?;
-        Ok(convert::scalars_out(py, gains))
+        let unit =
+            vector_unit.map_or_else(|| Ok(VectorUnit::widest()), |name| self::vector_unit(py, name))?;
+        let matrices = convert::row_major::<4, 4>(py, "motions", &motions)?;
+        let matrices: &[f64] = &matrices;
+        let outcome = py.detach(|| {
+            let execution = Execution { unit, threads };
+            let criterion = criterion.inner.as_ref();
+            self.model().gains_by(&belief.inner, criterion, Motions::Matrices(matrices), &execution)
+        });
+        match outcome {
+            Ok(gains) => Ok(convert::scalars_out(py, gains)),
+            Err(error @ Error::NotRigid { .. }) => {
+                // Once more, to say which.
+                convert::transforms(py, "motions", &motions)?;
+                Err(to_python(py, error))
+            }
+            Err(error) => Err(to_python(py, error)),
+        }
     }
 
     /// Information `(N, n, n)` of each candidate motion; zero where too little would be in sight.

@@ -176,6 +176,11 @@ impl Camera {
         Self::new(self.lens, &parameters[..self.lens.parameter_count()])
     }
 
+    /// Largest squared distance from the axis, in the plane at unit depth, of a point that the lens sees.
+    pub(crate) fn max_squared_radius(&self) -> f64 {
+        self.max_squared_radius
+    }
+
     /// The point at unit depth after the lens; None outside the region where the lens is one-to-one.
     #[inline]
     fn bend(&self, x: f64, y: f64) -> Option<Bent> {

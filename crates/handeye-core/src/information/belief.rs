@@ -88,7 +88,7 @@ pub fn entropy(n: usize, log_determinant_covariance: f64) -> f64 {
 }
 
 /// Inverse and log-determinant by Cholesky of the matrix scaled to a unit diagonal (units differ by orders).
-fn invert(m: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
+pub(super) fn invert(m: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
     let n = m.nrows();
     if m.iter().any(|x| !x.is_finite()) || (0..n).any(|i| m[(i, i)] <= 0.0) {
         return None;

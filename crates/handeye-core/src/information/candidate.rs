@@ -1,13 +1,15 @@
 //! What a view not yet taken would tell: its predicted information, seen through the noise of the robot.
 
-use nalgebra::{DMatrix, Matrix6, Vector2};
+use nalgebra::{DMatrix, Matrix4, Matrix6, Vector2};
 
 use super::belief::{Belief, CHAIN};
 use super::criteria::Criterion;
+use super::scorer::Scorer;
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
 use crate::least_squares::{Model, Moments, PixelColumns, PixelParameters, Side, ViewBlock, marginalised};
 use crate::se3::Se3;
+use crate::simd::VectorUnit;
 
 /// Which features a candidate is expected to see.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,6 +130,21 @@ impl CandidateModel<'_> {
         Some(Candidate { factor, seen })
     }
 
+    /// Information of the camera-frame twist at a pose, the robot taken as exact, and the number of features in sight.
+    pub(super) fn information(&self, pose: &Se3) -> (Matrix6<f64>, usize) {
+        let weight = 1.0 / (self.pixel_sigma * self.pixel_sigma);
+        let mut moments = Moments::new();
+        let mut seen = 0;
+        for feature in self.features {
+            let Some((pixel, d)) = self.camera.observe_with_twist_derivative(pose, feature) else { continue };
+            if self.in_image(&pixel) {
+                moments.add(&d, None, &Vector2::zeros(), weight);
+                seen += 1;
+            }
+        }
+        (moments.finish().0, seen)
+    }
+
     /// Gains of candidates at the motions; NaN where too little would be in sight.
     ///
     /// # Errors
@@ -138,6 +155,20 @@ impl CandidateModel<'_> {
         criterion: &dyn Criterion,
         motions: &[Se3],
     ) -> Result<Vec<f64>, Error> {
+        self.gains_by(belief, criterion, Motions::Transforms(motions), &Execution::default())
+    }
+
+    /// As [`CandidateModel::gains`], of motions in either form and with a say in how the machine is used.
+    ///
+    /// # Errors
+    /// As [`CandidateModel::gains`], and [`Error::NotRigid`] if a matrix is no rigid transform.
+    pub fn gains_by(
+        &self,
+        belief: &Belief,
+        criterion: &dyn Criterion,
+        motions: Motions<'_>,
+        execution: &Execution,
+    ) -> Result<Vec<f64>, Error> {
         if belief.len() != self.parameter_count() {
             return Err(Error::invalid(format!(
                 "the belief has {} parameters, the candidates {}",
@@ -145,33 +176,103 @@ impl CandidateModel<'_> {
                 self.parameter_count()
             )));
         }
-        let plain_entropy = criterion.is_plain_entropy() && belief.len() == CHAIN;
+        let mut gains = vec![f64::NAN; motions.len()];
+        if let Some(of) = criterion.entropy_of().filter(|_| belief.len() == CHAIN) {
+            Scorer::new(self, belief, of, execution.unit)?.score(motions, execution, &mut gains)?;
+            return Ok(gains);
+        }
         let prepared = criterion.prepare(belief)?;
-        Ok(motions
-            .iter()
-            .map(|motion| {
-                if plain_entropy {
-                    self.block(motion).map(|(block, _)| self.entropy_gain(belief, &block.m, motion))
-                } else {
-                    self.candidate(motion, None).map(|c| prepared.gain(&c.factor))
-                }
-                .unwrap_or(f64::NAN)
-            })
-            .collect())
+        for (i, gain) in gains.iter_mut().enumerate() {
+            if let Some(candidate) = self.candidate(&motions.get(i)?, None) {
+                *gain = prepared.gain(&candidate.factor);
+            }
+        }
+        Ok(gains)
+    }
+}
+
+/// Robot motions `A` of candidates, as they come.
+#[derive(Clone, Copy, Debug)]
+pub enum Motions<'a> {
+    /// Transforms.
+    Transforms(&'a [Se3]),
+    /// Homogeneous 4 x 4 matrices, row by row, one after the other: 16 numbers each.
+    Matrices(&'a [f64]),
+}
+
+impl Motions<'_> {
+    /// How many.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Transforms(transforms) => transforms.len(),
+            Self::Matrices(matrices) => matrices.len() / 16,
+        }
     }
 
-    /// `1/2 ln |I + L' S L|` with `S = B Lambda^-1 B'`, by blocks of six.
-    fn entropy_gain(&self, belief: &Belief, m: &Matrix6<f64>, motion: &Se3) -> f64 {
-        let to_y = (self.x * *motion).adjoint();
-        let covariance = belief.covariance();
-        let xx = covariance.fixed_view::<6, 6>(0, 0);
-        let xy = covariance.fixed_view::<6, 6>(0, 6);
-        let yy = covariance.fixed_view::<6, 6>(6, 6);
-        let cross = xy * to_y.transpose();
-        let s = xx + cross + cross.transpose() + to_y * yy * to_y.transpose();
-        let root = semidefinite_root6(m);
-        let inner = Matrix6::identity() + root.transpose() * s * root;
-        inner.cholesky().map_or(f64::NAN, |c| (0..6).map(|i| c.l_dirty()[(i, i)].ln()).sum())
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    fn get(&self, i: usize) -> Result<Se3, Error> {
+        match self {
+            Self::Transforms(transforms) => Ok(transforms[i]),
+            Self::Matrices(matrices) => {
+                Se3::from_matrix(&Matrix4::from_row_slice(&matrices[16 * i..16 * (i + 1)]))
+            }
+        }
+    }
+
+    /// `count` motions from `first` on.
+    pub(super) fn part(&self, first: usize, count: usize) -> Self {
+        match self {
+            Self::Transforms(transforms) => Self::Transforms(&transforms[first..first + count]),
+            Self::Matrices(matrices) => Self::Matrices(&matrices[16 * first..16 * (first + count)]),
+        }
+    }
+
+    /// Writes the matrices to the front of `to` and repeats the last one to its end.
+    pub(super) fn fill(&self, to: &mut [f64]) {
+        match self {
+            Self::Transforms(transforms) => {
+                for (to, from) in to.chunks_exact_mut(16).zip(*transforms) {
+                    to.copy_from_slice(from.to_matrix().transpose().as_slice());
+                }
+            }
+            Self::Matrices(matrices) => to[..matrices.len()].copy_from_slice(matrices),
+        }
+        let filled = 16 * self.len();
+        for at in (filled..to.len()).step_by(16) {
+            to.copy_within(filled - 16..filled, at);
+        }
+    }
+}
+
+/// How the machine is used; results do not depend on it beyond rounding.
+#[derive(Clone, Copy, Debug)]
+pub struct Execution {
+    /// Which vector unit.
+    pub unit: VectorUnit,
+    /// How many threads; zero for as many as the machine runs at once, if there is enough to do.
+    pub threads: usize,
+}
+
+impl Default for Execution {
+    fn default() -> Self {
+        Self { unit: VectorUnit::widest(), threads: 0 }
+    }
+}
+
+/// Candidates below which waking a second thread costs more than it brings.
+const CANDIDATES_PER_THREAD: usize = 10_000;
+
+impl Execution {
+    pub(super) fn threads_for(&self, candidates: usize) -> usize {
+        let most = (candidates / CANDIDATES_PER_THREAD).max(1);
+        match self.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from).min(most),
+            threads => threads.min(candidates.max(1)),
+        }
     }
 }
 
@@ -205,14 +306,4 @@ pub(crate) fn semidefinite_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
         }
     }
     m
-}
-
-fn semidefinite_root6(m: &Matrix6<f64>) -> Matrix6<f64> {
-    match m.cholesky() {
-        Some(factor) => factor.l(),
-        None => {
-            let root = semidefinite_root(DMatrix::from_column_slice(6, 6, m.as_slice()));
-            Matrix6::from_column_slice(root.as_slice())
-        }
-    }
 }

@@ -6,6 +6,7 @@
 mod belief;
 mod candidate;
 pub mod criteria;
+mod scorer;
 
 pub use belief::{Belief, entropy};
-pub use candidate::{Candidate, CandidateModel, Sight};
+pub use candidate::{Candidate, CandidateModel, Execution, Motions, Sight};

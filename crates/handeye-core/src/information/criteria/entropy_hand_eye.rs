@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Criterion, Gain, log_det_update};
+use super::{Criterion, EntropyOf, Gain, log_det_update};
 use crate::error::Error;
 use crate::information::Belief;
 
@@ -25,6 +25,10 @@ impl Criterion for EntropyHandEye {
             .nuisance()
             .ok_or_else(|| Error::degenerate("the information of the target's pose is singular"))?;
         Ok(Box::new(Prepared { belief, nuisance }))
+    }
+
+    fn entropy_of(&self) -> Option<EntropyOf> {
+        Some(EntropyOf::HandEye)
     }
 }
 

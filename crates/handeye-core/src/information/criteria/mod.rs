@@ -28,10 +28,19 @@ pub trait Criterion: Sync {
     /// [`Error::Degenerate`] where the belief has no value under this criterion.
     fn prepare<'a>(&'a self, belief: &'a Belief) -> Result<Box<dyn Gain + 'a>, Error>;
 
-    /// Whether this is the entropy of all parameters, which has a faster form.
-    fn is_plain_entropy(&self) -> bool {
-        false
+    /// Whose entropy this is, if it is one: entropies have a faster form.
+    fn entropy_of(&self) -> Option<EntropyOf> {
+        None
     }
+}
+
+/// Whose entropy a criterion lowers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EntropyOf {
+    /// All parameters.
+    Everything,
+    /// `X` alone, everything else marginalised.
+    HandEye,
 }
 
 /// The gain of candidates over one belief; larger is better, zero is nothing.

@@ -1,0 +1,200 @@
+//! Determinants of six-dimensional measurements, lanes = candidates.
+
+use super::block::{BLOCK, Block, UPPER, load, upper};
+use crate::simd::{Kernel, Simd, Vector, ln};
+
+/// `S = constant + U U'` with `U = offset + Ad(X A) root`: a covariance of the camera-frame twist.
+pub(super) struct Form {
+    /// Symmetric, upper triangle row by row.
+    pub constant: [f64; UPPER],
+    /// The part that the motion moves; none if it moves nothing.
+    pub moved: Option<Moved>,
+}
+
+/// `U = offset + Ad(X A) root`.
+pub(super) struct Moved {
+    /// 6 x 6, row by row.
+    pub offset: [[f64; 6]; 6],
+    /// Lower triangle, 6 x 6, row by row.
+    pub root: [[f64; 6]; 6],
+}
+
+/// Pivots of an information below this fraction of their diagonal are rounding.
+pub(super) const NULL_PIVOT: f64 = 1e-13;
+
+/// Does the body for each of the indices, each a constant.
+macro_rules! each {
+    ($i:ident in [$($n:literal)*] $body:block) => {
+        $({
+            const $i: usize = $n;
+            $body
+        })*
+    };
+}
+
+/// `|I + scale M S|` of a block, for `M` the information in it.
+pub(super) struct Determinant<'a> {
+    pub scale: f64,
+    pub form: &'a Form,
+    pub block: &'a Block,
+    pub out: &'a mut [f64; BLOCK],
+}
+
+impl Kernel for Determinant<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        for at in (0..BLOCK).step_by(S::LANES) {
+            let mut s = [simd.splat(0.0); UPPER];
+            for (entry, constant) in s.iter_mut().zip(&self.form.constant) {
+                *entry = simd.splat(*constant);
+            }
+            if let Some(moved) = &self.form.moved {
+                let u = spread(simd, moved, &load(simd, &self.block.before_y, at));
+                add_square(&u, &mut s);
+            }
+            let m = load(simd, &self.block.information, at);
+            determinant(simd, m, simd.splat(self.scale), s).store(&mut self.out[at..]);
+        }
+    }
+}
+
+/// `U = offset + Ad(T) root`, with `Ad(T) = [R, [t]R; 0, R]`.
+#[expect(clippy::reversed_empty_ranges, reason = "unrolled: the last steps have nothing left to do")]
+#[inline(always)]
+fn spread<S: Simd>(simd: S, moved: &Moved, t: &[S::Vector; 12]) -> [[S::Vector; 6]; 6] {
+    let zero = simd.splat(0.0);
+    let mut u = [[zero; 6]; 6];
+    macro_rules! rotated {
+        // Entry `(i, j)` of `R` times rows `$from..$from + 3` of the root, from row `$first` of these on.
+        ($i:expr, $j:expr, $from:literal, $first:expr, $start:expr) => {{
+            let mut sum = $start;
+            for k in $first..3 {
+                sum = t[3 * $i + k].mul_add(simd.splat(moved.root[$from + k][$j]), sum);
+            }
+            sum
+        }};
+    }
+    // Lower rows: R [G21 G22].
+    let mut low = [[zero; 6]; 3];
+    each!(I in [0 1 2] {
+        each!(J in [0 1 2] { low[I][J] = rotated!(I, J, 3, 0, zero); });
+        each!(J in [3 4 5] { low[I][J] = rotated!(I, J, 3, J - 3, zero); });
+    });
+    each!(I in [0 1 2] {
+        // t x (column of the lower rows)
+        const A: usize = (I + 1) % 3;
+        const B: usize = (I + 2) % 3;
+        each!(J in [0 1 2 3 4 5] {
+            let mut sum = simd.splat(moved.offset[I][J]);
+            if J < 3 {
+                sum = rotated!(I, J, 0, J, sum);
+            }
+            sum = t[9 + A].mul_add(low[B][J], sum);
+            u[I][J] = t[9 + B].neg_mul_add(low[A][J], sum);
+            u[I + 3][J] = low[I][J] + simd.splat(moved.offset[I + 3][J]);
+        });
+    });
+    u
+}
+
+/// Adds `U U'` to a symmetric matrix.
+#[inline(always)]
+fn add_square<V: Vector>(u: &[[V; 6]; 6], s: &mut [V; UPPER]) {
+    each!(I in [0 1 2 3 4 5] {
+        for j in I..6 {
+            let mut sum = s[upper(I, j)];
+            for (a, b) in u[I].iter().zip(&u[j]) {
+                sum = a.mul_add(*b, sum);
+            }
+            s[upper(I, j)] = sum;
+        }
+    });
+}
+
+/// `|I + scale M S|`.
+///
+/// `M = L D L'` is taken as six scalar measurements with directions `l_k` and informations `d_k`; each in turn
+/// multiplies the determinant by `p = 1 + d l' S l` and leaves the covariance `S - (d / p) S l l' S`. Every factor is
+/// at least one, whatever null directions `M` has.
+#[expect(clippy::reversed_empty_ranges, reason = "unrolled: the last steps have nothing left to do")]
+#[inline(always)]
+fn determinant<S: Simd>(
+    simd: S,
+    mut m: [S::Vector; UPPER],
+    scale: S::Vector,
+    mut s: [S::Vector; UPPER],
+) -> S::Vector {
+    let zero = simd.splat(0.0);
+    let one = simd.splat(1.0);
+    let floor = simd.splat(NULL_PIVOT);
+    let mut limits = [zero; 6];
+    each!(K in [0 1 2 3 4 5] { limits[K] = floor * m[upper(K, K)]; });
+    let mut product = one;
+    each!(K in [0 1 2 3 4 5] {
+        // Pivot and column of the factorisation of M.
+        let pivot = m[upper(K, K)];
+        let counts = pivot.greater(limits[K]);
+        let inverse = (one / pivot).keep(counts);
+        let d = (pivot * scale).keep(counts);
+        let mut l = [zero; 6];
+        for i in K + 1..6 {
+            l[i] = m[upper(K, i)] * inverse;
+        }
+        for i in K + 1..6 {
+            for j in i..6 {
+                m[upper(i, j)] = l[i].neg_mul_add(m[upper(K, j)], m[upper(i, j)]);
+            }
+        }
+        // S l, and l' S l.
+        let mut v = [zero; 6];
+        for i in K..6 {
+            let mut sum = s[upper(i, K)];
+            for j in K + 1..6 {
+                sum = s[upper(i, j)].mul_add(l[j], sum);
+            }
+            v[i] = sum;
+        }
+        let mut variance = v[K];
+        for i in K + 1..6 {
+            variance = l[i].mul_add(v[i], variance);
+        }
+        let factor = d.mul_add(variance, one);
+        product = product * factor;
+        let weight = d / factor;
+        for i in K + 1..6 {
+            let weighted = v[i] * weight;
+            for j in i..6 {
+                s[upper(i, j)] = weighted.neg_mul_add(v[j], s[upper(i, j)]);
+            }
+        }
+    });
+    product
+}
+
+/// `1/2 ln (with / without)`, NaN where fewer features are in sight than wanted (or the numbers overflow).
+pub(super) struct Gains<'a> {
+    pub block: &'a Block,
+    pub fewest: f64,
+    pub compared: bool,
+    pub out: &'a mut [f64; BLOCK],
+}
+
+impl Kernel for Gains<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        for at in (0..BLOCK).step_by(S::LANES) {
+            let mut ratio = simd.load(&self.block.with[at..]);
+            if self.compared {
+                ratio = ratio / simd.load(&self.block.without[at..]);
+            }
+            let gain = ln(simd, ratio) * simd.splat(0.5);
+            let enough = simd.load(&self.block.seen[at..]).at_least(simd.splat(self.fewest));
+            let told = enough & simd.splat(f64::MAX).at_least(ratio);
+            gain.keep_or(told, simd.splat(f64::NAN)).store(&mut self.out[at..]);
+        }
+    }
+}

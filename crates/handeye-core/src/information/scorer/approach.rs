@@ -1,0 +1,146 @@
+//! From robot motions to camera poses: check that they are rigid, then `X A` and `X A Y`.
+
+use super::block::{BLOCK, Block, store};
+use crate::se3::{RIGID_TOLERANCE, Se3};
+use crate::simd::{Kernel, Mask, Simd, Vector};
+
+/// Doubles of a homogeneous 4 x 4 matrix.
+pub(super) const MATRIX: usize = 16;
+
+/// A rotation that deviates by less is used as it is.
+const ROUNDING: f64 = 1e-14;
+
+/// Puts a block of motions, row-major 4 x 4 matrices, at its places in front of the target.
+pub(super) struct Approach<'a> {
+    pub x: &'a [f64; 12],
+    pub y: &'a [f64; 12],
+    pub motions: &'a [f64],
+    pub block: &'a mut Block,
+}
+
+/// Rotation row by row, then translation.
+pub(super) fn entries(t: &Se3) -> [f64; 12] {
+    let mut out = [0.0; 12];
+    for i in 0..3 {
+        for j in 0..3 {
+            out[3 * i + j] = t.rotation[(i, j)];
+        }
+        out[9 + i] = t.translation[i];
+    }
+    out
+}
+
+impl Kernel for Approach<'_> {
+    /// Whether every motion is rigid; the block is of no use otherwise.
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> bool {
+        let motions = &self.motions[..BLOCK * MATRIX];
+        for at in (0..BLOCK).step_by(S::LANES) {
+            let motions = &motions[at * MATRIX..];
+            let mut motion = [simd.splat(0.0); 12];
+            for i in 0..3 {
+                let [a, b, c, t] = simd.load_four(&motions[4 * i..], MATRIX);
+                motion[3 * i] = a;
+                motion[3 * i + 1] = b;
+                motion[3 * i + 2] = c;
+                motion[9 + i] = t;
+            }
+            let last = simd.load_four(&motions[12..], MATRIX);
+            if !repair(simd, &mut motion, &last) {
+                return false;
+            }
+            let before_y = left_product(simd, self.x, &motion);
+            store(&before_y, &mut self.block.before_y, at);
+            store(&right_product(simd, &before_y, self.y), &mut self.block.pose, at);
+        }
+        true
+    }
+}
+
+/// Repairs rounding in the rotations as [`Se3::from_matrix`] does; false if one is not rigid.
+#[inline(always)]
+fn repair<S: Simd>(simd: S, motion: &mut [S::Vector; 12], last: &[S::Vector; 4]) -> bool {
+    let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
+    let mut gram = columns_squared(motion);
+    for i in [0, 3, 5] {
+        gram[i] = gram[i] - one;
+    }
+    // Not a number where a translation is not finite.
+    let mut largest = (motion[9] * zero + motion[10] * zero + motion[11] * zero).abs();
+    let mut rigid = simd.splat(RIGID_TOLERANCE).at_least(largest);
+    for deviation in
+        [gram[0], gram[1], gram[2], gram[3], gram[4], gram[5], last[0], last[1], last[2], last[3] - one]
+    {
+        rigid = rigid & simd.splat(RIGID_TOLERANCE).at_least(deviation.abs());
+        largest = largest.max(deviation.abs());
+    }
+    let r = &*motion;
+    let minors = [r[4] * r[8] - r[5] * r[7], r[5] * r[6] - r[3] * r[8], r[3] * r[7] - r[4] * r[6]];
+    let determinant = r[0].mul_add(minors[0], r[1].mul_add(minors[1], r[2] * minors[2]));
+    if !(rigid & determinant.greater(zero)).all() {
+        return false;
+    }
+    if !simd.splat(ROUNDING).at_least(largest).all() {
+        newton_schulz(simd, motion);
+        newton_schulz(simd, motion);
+    }
+    true
+}
+
+/// `R' R`, upper triangle row by row.
+#[inline(always)]
+fn columns_squared<V: Vector>(r: &[V; 12]) -> [V; 6] {
+    macro_rules! dot {
+        ($i:literal, $j:literal) => {
+            r[$i].mul_add(r[$j], r[3 + $i].mul_add(r[3 + $j], r[6 + $i] * r[6 + $j]))
+        };
+    }
+    [dot!(0, 0), dot!(0, 1), dot!(0, 2), dot!(1, 1), dot!(1, 2), dot!(2, 2)]
+}
+
+/// One step towards the nearest rotation: `R (3 I - R' R) / 2`.
+#[inline(always)]
+fn newton_schulz<S: Simd>(simd: S, r: &mut [S::Vector; 12]) {
+    let [g00, g01, g02, g11, g12, g22] = columns_squared(r);
+    let (half, middle) = (simd.splat(-0.5), simd.splat(1.5));
+    let d = [g00.mul_add(half, middle), g11.mul_add(half, middle), g22.mul_add(half, middle)];
+    let (o01, o02, o12) = (g01 * half, g02 * half, g12 * half);
+    for i in 0..3 {
+        let (a, b, c) = (r[3 * i], r[3 * i + 1], r[3 * i + 2]);
+        r[3 * i] = a.mul_add(d[0], b.mul_add(o01, c * o02));
+        r[3 * i + 1] = a.mul_add(o01, b.mul_add(d[1], c * o12));
+        r[3 * i + 2] = a.mul_add(o02, b.mul_add(o12, c * d[2]));
+    }
+}
+
+/// `L A`, `L` the same for all lanes.
+#[inline(always)]
+fn left_product<S: Simd>(simd: S, left: &[f64; 12], a: &[S::Vector; 12]) -> [S::Vector; 12] {
+    let mut out = *a;
+    for i in 0..3 {
+        let (p, q, r) = (simd.splat(left[3 * i]), simd.splat(left[3 * i + 1]), simd.splat(left[3 * i + 2]));
+        for j in 0..3 {
+            out[3 * i + j] = p.mul_add(a[j], q.mul_add(a[3 + j], r * a[6 + j]));
+        }
+        out[9 + i] = p.mul_add(a[9], q.mul_add(a[10], r.mul_add(a[11], simd.splat(left[9 + i]))));
+    }
+    out
+}
+
+/// `A R`, `R` the same for all lanes.
+#[inline(always)]
+fn right_product<S: Simd>(simd: S, a: &[S::Vector; 12], right: &[f64; 12]) -> [S::Vector; 12] {
+    let mut out = *a;
+    for i in 0..3 {
+        let (p, q, r) = (a[3 * i], a[3 * i + 1], a[3 * i + 2]);
+        for j in 0..4 {
+            let (to, from) = if j < 3 { (3 * i + j, [j, 3 + j, 6 + j]) } else { (9 + i, [9, 10, 11]) };
+            let first = r * simd.splat(right[from[2]]);
+            let sum = p.mul_add(simd.splat(right[from[0]]), q.mul_add(simd.splat(right[from[1]]), first));
+            out[to] = if j < 3 { sum } else { sum + a[9 + i] };
+        }
+    }
+    out
+}

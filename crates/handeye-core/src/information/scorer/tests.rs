@@ -1,0 +1,293 @@
+//! Lanes against one candidate at a time, in every vector unit of this machine.
+
+use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
+use proptest::prelude::*;
+
+use crate::camera::{Camera, Feature, Lens};
+use crate::information::criteria::{Criterion, Entropy, EntropyHandEye};
+use crate::information::{Belief, CandidateModel, Execution, Motions, Sight};
+use crate::least_squares::Side;
+use crate::se3::Se3;
+use crate::simd::VectorUnit;
+use crate::testing::Random;
+
+fn camera(lens: Lens) -> Camera {
+    let all = [
+        1400.0, 1350.0, 630.0, 520.0, -0.12, 0.06, 1e-3, -6e-4, 0.01, 0.03, -0.02, 0.005, 2e-3, -1e-3, 1e-3,
+        5e-4,
+    ];
+    let fisheye = [500.0, 490.0, 630.0, 520.0, 0.01, -0.02, 0.003, -0.001];
+    match lens {
+        Lens::KannalaBrandt => Camera::new(lens, &fisheye).unwrap(),
+        _ => Camera::new(lens, &all[..lens.parameter_count()]).unwrap(),
+    }
+}
+
+/// A board of 5 x 4 points, or scattered points off any plane.
+fn features(random: &mut Random, scattered: bool, radius: f64) -> Vec<Feature> {
+    (0..20)
+        .map(|i| {
+            let mut position = Vector3::new(f64::from(i % 5) * 0.03, f64::from(i / 5) * 0.03, 0.0);
+            if scattered {
+                position += Vector3::new(
+                    random.uniform(0.0, 0.02),
+                    random.uniform(0.0, 0.02),
+                    random.uniform(0.0, 0.05),
+                );
+            }
+            Feature { position, radius }
+        })
+        .collect()
+}
+
+struct Scene {
+    camera: Camera,
+    x: Se3,
+    y: Se3,
+    features: Vec<Feature>,
+    robot: Option<(Side, Matrix6<f64>)>,
+    sight: Sight,
+    belief: Belief,
+    motions: Vec<Se3>,
+}
+
+impl Scene {
+    /// Candidates of which some see all of the target, some a part, some nothing, some have it behind them.
+    fn new(random: &mut Random, lens: Lens, count: usize, scattered: bool, radius: f64) -> Self {
+        let camera = camera(lens);
+        let (x, y) = (random.transform(0.2, 2.0), random.transform(1.0, 2.0));
+        let features = features(random, scattered, radius);
+        let motions = (0..count)
+            .map(|i| {
+                let mut view = random.transform(0.05, 0.6);
+                view.translation += view.rotation * -Vector3::new(0.06, 0.045, 0.0);
+                view.translation += match i % 5 {
+                    0 => Vector3::new(
+                        random.uniform(-0.4, 0.4),
+                        random.uniform(-0.3, 0.3),
+                        random.uniform(0.3, 0.9),
+                    ),
+                    1 if i % 3 == 0 => Vector3::new(0.0, 0.0, random.uniform(-0.6, 0.05)),
+                    _ => Vector3::new(0.0, 0.0, random.uniform(0.35, 0.9)),
+                };
+                x.inverse() * view * y.inverse()
+            })
+            .collect();
+        let sight = Sight { image: Some([1280.0, 1024.0]), margin_px: 8.0, fewest: 4 };
+        let mut scene = Self {
+            camera,
+            x,
+            y,
+            features,
+            robot: None,
+            sight,
+            belief: Belief::new(DMatrix::identity(12, 12)).unwrap(),
+            motions,
+        };
+        scene.belief = scene.start();
+        scene
+    }
+
+    /// What eight views around the target would tell.
+    fn start(&self) -> Belief {
+        let mut random = Random::new(5);
+        let mut information = DMatrix::identity(12, 12) * 1e-2;
+        for _ in 0..8 {
+            let mut view = random.transform(0.03, 0.7);
+            view.translation -= view.rotation * Vector3::new(0.06, 0.045, 0.0);
+            view.translation.z += 0.6;
+            let motion = self.x.inverse() * view * self.y.inverse();
+            if let Some(candidate) = self.model().candidate(&motion, None) {
+                information += &candidate.factor * candidate.factor.transpose();
+            }
+        }
+        Belief::new(information).unwrap()
+    }
+
+    fn model(&self) -> CandidateModel<'_> {
+        CandidateModel {
+            camera: &self.camera,
+            x: self.x,
+            y: self.y,
+            features: &self.features,
+            pixel_sigma: 0.2,
+            robot: self.robot,
+            pixel_parameters: None,
+            kinematic_count: 0,
+            sight: self.sight,
+        }
+    }
+
+    /// By the factor of each candidate's information: another way round in every step.
+    fn expected(&self, criterion: &dyn Criterion) -> Vec<f64> {
+        let prepared = criterion.prepare(&self.belief).unwrap();
+        let model = self.model();
+        self.motions
+            .iter()
+            .map(|motion| model.candidate(motion, None).map_or(f64::NAN, |c| prepared.gain(&c.factor)))
+            .collect()
+    }
+
+    fn check(&self, criterion: &dyn Criterion, tolerance: f64) -> Result<Vec<f64>, TestCaseError> {
+        let expected = self.expected(criterion);
+        for unit in VectorUnit::ALL.into_iter().filter(|unit| unit.is_available()) {
+            for threads in [1, 3] {
+                let found = self
+                    .model()
+                    .gains_by(
+                        &self.belief,
+                        criterion,
+                        Motions::Transforms(&self.motions),
+                        &Execution { unit, threads },
+                    )
+                    .unwrap();
+                prop_assert_eq!(found.len(), expected.len());
+                for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                    let close = (found - expected).abs() <= tolerance * expected.abs().max(0.1);
+                    prop_assert!(
+                        close || (found.is_nan() && expected.is_nan()),
+                        "{}: candidate {}: {} for {}",
+                        unit.name(),
+                        i,
+                        found,
+                        expected
+                    );
+                }
+            }
+        }
+        Ok(expected)
+    }
+}
+
+fn robot_root(random: &mut Random) -> Matrix6<f64> {
+    let scale = Matrix6::from_diagonal(&Vector6::new(5e-4, 1e-3, 7e-4, 8e-4, 4e-4, 6e-4));
+    scale * Matrix6::from_fn(|i, j| if i == j { 1.0 } else { random.uniform(-0.4, 0.4) })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn lanes_agree_with_one_at_a_time(
+        seed in any::<u64>(),
+        lens in prop::sample::select(Lens::ALL.to_vec()),
+        count in 0..100_usize,
+        scattered in any::<bool>(),
+        noisy in 0..3_u8,
+        fewest in prop::sample::select(vec![0, 8, 20]),
+    ) {
+        let random = &mut Random::new(seed);
+        let mut scene = Scene::new(random, lens, count, scattered, 0.0);
+        scene.robot = match noisy {
+            0 => None,
+            1 => Some((Side::Left, robot_root(random))),
+            _ => Some((Side::Right, robot_root(random))),
+        };
+        scene.sight.fewest = fewest;
+        // Few points may lie on one line, whose information is singular but for rounding.
+        let tolerance = if fewest < 8 { 1e-7 } else { 1e-10 };
+        scene.check(&Entropy, tolerance)?;
+        scene.check(&EntropyHandEye, tolerance)?;
+    }
+
+    #[test]
+    fn without_an_image_all_that_the_lens_sees_counts(
+        seed in any::<u64>(),
+        lens in prop::sample::select(Lens::ALL.to_vec()),
+    ) {
+        let mut scene = Scene::new(&mut Random::new(seed), lens, 60, false, 0.0);
+        scene.sight.image = None;
+        // Points that all but touch the camera make the information ill-conditioned, either way.
+        let depth = |motion: &Se3, f: &Feature| (scene.x * *motion * scene.y).act(&f.position).z;
+        let near = |motion: &Se3| scene.features.iter().any(|f| (0.0..0.05).contains(&depth(motion, f)));
+        scene.motions = scene.motions.iter().copied().filter(|motion| !near(motion)).collect();
+        scene.check(&Entropy, 1e-8)?;
+    }
+}
+
+#[test]
+fn candidates_are_of_every_kind() {
+    let scene = Scene::new(&mut Random::new(3), Lens::Pinhole, 400, false, 0.0);
+    let model = scene.model();
+    let kinds = scene.motions.iter().map(|m| model.information(&(scene.x * *m * scene.y)).1);
+    let (mut none, mut some, mut all) = (0, 0, 0);
+    for seen in kinds {
+        match seen {
+            0 => none += 1,
+            20 => all += 1,
+            _ => some += 1,
+        }
+    }
+    assert!(none > 20 && some > 20 && all > 200, "{none} {some} {all}");
+}
+
+#[test]
+fn circles_go_feature_by_feature() {
+    let mut scene = Scene::new(&mut Random::new(8), Lens::BrownConrady5, 45, false, 0.01);
+    scene.check(&Entropy, 1e-10).unwrap();
+    scene.robot = Some((Side::Right, robot_root(&mut Random::new(1))));
+    scene.check(&EntropyHandEye, 1e-10).unwrap();
+}
+
+#[test]
+fn few_points_in_sight_leave_directions_open() {
+    // One or two points: an information of rank two or four.
+    let mut scene = Scene::new(&mut Random::new(11), Lens::Pinhole, 200, false, 0.0);
+    scene.features.truncate(2);
+    scene.sight.fewest = 1;
+    let gains = scene.check(&Entropy, 1e-9).unwrap();
+    assert!(gains.iter().filter(|g| g.is_finite()).count() > 100);
+}
+
+#[test]
+fn a_weak_belief_gives_no_nan() {
+    // A metre and a radian of prior, and nothing else: the covariance of a view spans fourteen orders.
+    let mut scene = Scene::new(&mut Random::new(12), Lens::Pinhole, 200, false, 0.0);
+    scene.belief = Belief::new(DMatrix::identity(12, 12)).unwrap();
+    let gains = scene.check(&Entropy, 1e-9).unwrap();
+    assert!(gains.iter().filter(|g| g.is_finite()).count() > 100);
+}
+
+#[test]
+fn matrices_are_repaired_or_refused() {
+    let scene = Scene::new(&mut Random::new(4), Lens::Pinhole, 70, false, 0.0);
+    let mut random = Random::new(9);
+    let mut matrices: Vec<f64> =
+        scene.motions.iter().flat_map(|m| m.to_matrix().transpose().as_slice().to_vec()).collect();
+    for entry in matrices.iter_mut().step_by(16) {
+        *entry += random.uniform(-1e-5, 1e-5);
+    }
+    let model = scene.model();
+    let repaired: Vec<Se3> = matrices
+        .chunks_exact(16)
+        .map(|m| Se3::from_matrix(&nalgebra::Matrix4::from_row_slice(m)).unwrap())
+        .collect();
+    let expected = model.gains(&scene.belief, &Entropy, &repaired).unwrap();
+    for unit in VectorUnit::ALL {
+        let execution = Execution { unit, threads: 1 };
+        let run = |matrices: &[f64]| {
+            model.gains_by(&scene.belief, &Entropy, Motions::Matrices(matrices), &execution)
+        };
+        for (found, expected) in run(&matrices).unwrap().iter().zip(&expected) {
+            let close = (found - expected).abs() < 1e-10 * expected.abs();
+            assert!(close || (found.is_nan() && expected.is_nan()), "{found} for {expected}");
+        }
+        for (place, value) in
+            [(0, 1.1), (3, f64::NAN), (7, f64::INFINITY), (10, f64::NAN), (12, 0.1), (15, 0.0)]
+        {
+            for index in [0, 31, 69] {
+                let mut broken = matrices.clone();
+                broken[16 * index + place] = value;
+                assert!(matches!(run(&broken), Err(crate::error::Error::NotRigid { .. })), "{place} {value}");
+            }
+        }
+        // A reflection.
+        let mut broken = matrices.clone();
+        broken[16 * 40..16 * 40 + 3].iter_mut().for_each(|x| *x = -*x);
+        assert!(run(&broken).is_err());
+        // Absurdly far away, but rigid.
+        let mut far = matrices.clone();
+        far[16 * 40 + 3] = 1e300;
+        assert!(run(&far).unwrap()[40].is_nan());
+    }
+}
