@@ -280,7 +280,12 @@ class Compressed:
     """Views of a problem, each reduced to the pose of its own image with that pose's information."""
 
     def __init__(
-        self, problem: Problem, poses: ArrayLike, *, free_camera: list[int] | None = None
+        self,
+        problem: Problem,
+        poses: ArrayLike,
+        *,
+        free_camera: list[int] | None = None,
+        board_scale: bool = False,
     ) -> None: ...
     @property
     def variances_px2(self) -> list[float]: ...

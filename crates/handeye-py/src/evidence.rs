@@ -87,12 +87,13 @@ impl Compressed {
 #[pymethods]
 impl Compressed {
     #[new]
-    #[pyo3(signature = (problem, poses, *, free_camera=None))]
+    #[pyo3(signature = (problem, poses, *, free_camera=None, board_scale=false))]
     fn new<'py>(
         py: Python<'py>,
         problem: &Problem,
         poses: Array<'py>,
         free_camera: Option<Vec<usize>>,
+        board_scale: bool,
     ) -> PyResult<Self> {
         let poses = convert::transforms(py, "poses", &poses)?;
         if poses.len() != problem.inner.view_count() {
@@ -106,10 +107,11 @@ impl Compressed {
         if let Some(i) = free.iter().find(|i| **i >= count) {
             return Err(invalid(py, &format!("camera parameter {i} of a lens with {count}")));
         }
-        let parameters = (!free.is_empty()).then(|| PixelParameters {
-            prior_information: DMatrix::zeros(free.len(), free.len()),
+        let columns = free.len() + usize::from(board_scale);
+        let parameters = (columns > 0).then(|| PixelParameters {
+            prior_information: DMatrix::zeros(columns, columns),
             camera: free,
-            board_scale: false,
+            board_scale,
         });
         let views = py
             .detach(|| {
