@@ -3,9 +3,11 @@
 import ast
 import re
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "handeye"
@@ -99,12 +101,29 @@ def test_every_locked_requirement_has_an_exact_version_and_a_hash() -> None:
             assert line.startswith("#") or ("==" in line and "--hash=sha256:" in line), f"{name}: {line[:80]}"
 
 
-def test_both_requirement_files_agree() -> None:
-    def pins(name: str) -> set[str]:
-        lines = (ROOT / "requirements" / name).read_text().splitlines()
-        return {line.split()[0] for line in lines if "==" in line}
+def pins(name: str) -> dict[str, str]:
+    """Package and version of every line of a file in `requirements`."""
+    lines = (ROOT / "requirements" / name).read_text().splitlines()
+    return dict(line.split()[0].split("==") for line in lines if "==" in line)
 
-    assert pins("run.txt") <= pins("dev.txt")
+
+def test_both_requirement_files_agree() -> None:
+    assert pins("run.txt").items() <= pins("dev.txt").items()
+
+
+@pytest.mark.parametrize(("name", "groups"), [("run.txt", {"build"}), ("dev.txt", {"build", "dev", "docs"})])
+def test_locked_requirements_are_those_of_the_project(name: str, groups: set[str]) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    wanted = list(project["project"]["dependencies"])
+    for group in groups:
+        wanted += [entry for entry in project["dependency-groups"][group] if isinstance(entry, str)]
+    locked = pins(name)
+    stale = [
+        entry
+        for requirement in map(Requirement, wanted)
+        if not requirement.specifier.contains(locked.get(entry := requirement.name, "0"))
+    ]
+    assert not stale, f"{name} does not meet pyproject.toml for {stale}: run `make lock`"
 
 
 def test_package_runs_nothing_that_a_file_says() -> None:
