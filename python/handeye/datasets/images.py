@@ -1,0 +1,100 @@
+"""Reading an image as grey values, without trusting the file."""
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handeye.datasets.image_header import IMAGE_SUFFIXES, image_size
+from handeye.datasets.reading import MIB, read_bytes
+from handeye.errors import InputError
+
+MAX_BYTES = 512 * MIB
+# Twice the largest cameras of industry; decoded, one grey value each.
+MAX_PIXELS = 1 << 28
+_TIFF_WIDTH, _TIFF_HEIGHT = 256, 257
+_FLAGS = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+
+
+def read_image(path: Path) -> NDArray[np.uint8]:
+    """Return the grey values (H, W) of a PNG, JPEG, BMP or TIFF file.
+
+    Colour becomes grey. 10, 12 and 14 bits kept in 16 are told by the brightest pixel and scaled to 8 by the
+    same power of two. An orientation noted in the file is ignored: pixels are those of the sensor.
+
+    Raises
+    ------
+    InputError
+        No such file, not an image, truncated or damaged, or too large; the message names the file.
+    """
+    if path.suffix.lower() not in IMAGE_SUFFIXES:
+        raise InputError(
+            f"{path}: expected an image ({', '.join(sorted(IMAGE_SUFFIXES))})", code="not_an_image"
+        )
+    content = read_bytes(path, MAX_BYTES)
+    # Sizes are looked at before anything is decoded: a small file can claim to be a very large image.
+    width, height = image_size(path) or _tiff_size(content, path)
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            f"{path}: {width} x {height} pixels, expected at most {MAX_PIXELS}", code="too_large"
+        )
+    try:
+        image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), _FLAGS)
+    except cv2.error as error:
+        raise _damaged(path, str(error).strip()[:200]) from error
+    if image is None:
+        raise _damaged(path, "it cannot be decoded")
+    if image.shape != (height, width):
+        found = f"{image.shape[1]} x {image.shape[0]} pixels where its header says {width} x {height}"
+        raise _damaged(path, found)
+    return _eight_bits(image, path)
+
+
+def _eight_bits(image: NDArray[np.integer[Any] | np.floating[Any]], path: Path) -> NDArray[np.uint8]:
+    if image.dtype == np.uint8:
+        return np.ascontiguousarray(image, dtype=np.uint8)
+    if image.dtype != np.uint16:
+        raise InputError(
+            f"{path}: pixels of {image.dtype}, expected 8 or 16 bits",
+            code="not_an_image",
+            hint="save the image with whole grey values",
+        )
+    grey = image.astype(np.uint16)
+    bits = max(int(grey.max()).bit_length(), 8)
+    return (grey >> (bits - 8)).astype(np.uint8)
+
+
+def _damaged(path: Path, found: str) -> InputError:
+    return InputError(f"{path}: a damaged image: {found}", code="damaged_image", hint="copy the file again")
+
+
+def _tiff_size(content: bytes, path: Path) -> tuple[int, int]:
+    """Return width and height of the first picture of a TIFF file (TIFF 6.0, sections 2 and 8).
+
+    Raises
+    ------
+    InputError
+        Not a TIFF file, or it breaks off.
+    """
+    order = {b"II*\0": "<", b"MM\0*": ">"}.get(content[:4])
+    if order is None:
+        raise InputError(f"{path}: not a TIFF image", code="not_an_image", hint="check what this file is")
+    sizes: dict[int, int] = {}
+    try:
+        (start,) = struct.unpack_from(f"{order}I", content, 4)
+        (entries,) = struct.unpack_from(f"{order}H", content, start)
+        for index in range(entries):
+            at = start + 2 + 12 * index
+            tag, kind, _ = struct.unpack_from(f"{order}HHI", content, at)
+            if tag in {_TIFF_WIDTH, _TIFF_HEIGHT}:
+                (sizes[tag],) = struct.unpack_from(order + ("H" if kind == 3 else "I"), content, at + 8)
+    except struct.error as error:
+        raise InputError(
+            f"{path}: the image is truncated", code="truncated_image", hint="copy the file again"
+        ) from error
+    if len(sizes) < 2:
+        raise InputError(f"{path}: a TIFF image without size", code="not_an_image")
+    return sizes[_TIFF_WIDTH], sizes[_TIFF_HEIGHT]

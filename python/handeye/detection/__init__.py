@@ -1,0 +1,20 @@
+"""From images to the points of a target: one file per family of targets, and what belongs to images alone."""
+
+from handeye.detection.base import Detection, Image, NotFound, Reason, relabeled
+from handeye.detection.batch import Batch, DetectionCache, detect_all
+from handeye.detection.detect import detect
+from handeye.detection.intrinsics import CameraCalibration, calibrate_camera
+
+__all__ = [
+    "Batch",
+    "CameraCalibration",
+    "Detection",
+    "DetectionCache",
+    "Image",
+    "NotFound",
+    "Reason",
+    "calibrate_camera",
+    "detect",
+    "detect_all",
+    "relabeled",
+]

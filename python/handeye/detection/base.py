@@ -1,0 +1,161 @@
+"""What a detection is, and what a failure to detect says."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from handeye.errors import DetectionError, InputError
+from handeye.types import Target
+from handeye.types.arrays import FloatArray, IndexArray, finite_array, index_array
+
+Image = NDArray[np.uint8]
+"""A grey picture (H, W)."""
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Detection:
+    """Points of a target found in one image.
+
+    Parameters
+    ----------
+    point_ids
+        (N,) indices into the points of the target, N >= 1, each at most once.
+    pixels
+        (N, 2) where they are: u to the right, v down, pixel centres at whole numbers. A circle is where the
+        area centroid of its image is, not the image of its centre.
+
+    Raises
+    ------
+    InputError
+        Wrong shapes, a pixel that is not finite, or a point twice.
+    """
+
+    point_ids: IndexArray
+    pixels: FloatArray
+
+    def __init__(self, point_ids: ArrayLike, pixels: ArrayLike) -> None:
+        ids = index_array(point_ids, "detection: point_ids")
+        values = finite_array(pixels, (None, 2), "detection: pixels")
+        if len(ids) == 0 or len(ids) != len(values) or len(np.unique(ids)) != len(ids):
+            raise InputError(
+                f"detection: {len(ids)} point ids for {len(values)} pixels, expected as many, at least one, "
+                "and none twice",
+                code="wrong_shape",
+            )
+        object.__setattr__(self, "point_ids", ids)
+        object.__setattr__(self, "pixels", values)
+
+    def __len__(self) -> int:
+        return len(self.point_ids)
+
+
+class Reason(StrEnum):
+    """Why a target was not found, as far as the image tells."""
+
+    IMAGE_TOO_SMALL = "image_too_small"
+    UNDEREXPOSED = "underexposed"
+    OVEREXPOSED = "overexposed"
+    LOW_CONTRAST = "low_contrast"
+    BLURRED = "blurred"
+    WRONG_SIZE = "wrong_size"
+    INCOMPLETE = "incomplete"
+    INCONSISTENT = "inconsistent"
+    NO_PATTERN = "no_pattern"
+    DETECTOR_FAILED = "detector_failed"
+
+
+_HINTS = {
+    Reason.IMAGE_TOO_SMALL: "use the full resolution of the camera",
+    Reason.UNDEREXPOSED: "expose longer or add light",
+    Reason.OVEREXPOSED: "expose shorter, or turn the board out of the reflection",
+    Reason.LOW_CONTRAST: "check the light and that the lens is open",
+    Reason.BLURRED: "focus the lens, or let the arm come to rest before the picture is taken",
+    Reason.WRONG_SIZE: "count rows and columns again: inner corners on a chessboard, circles on a grid",
+    Reason.INCOMPLETE: "bring the whole board into the image and nothing in front of it",
+    Reason.INCONSISTENT: "check rows, columns and dictionary against the printed board",
+    Reason.NO_PATTERN: "check that the board is in the image, whole, with a white margin, not too oblique",
+    Reason.DETECTOR_FAILED: "look at the image; if it is in order, please report it",
+}
+
+
+@dataclass(frozen=True)
+class NotFound:
+    """The target was not found.
+
+    Attributes
+    ----------
+    reason
+        The likeliest cause.
+    evidence
+        What was seen, for a person.
+    """
+
+    reason: Reason
+    evidence: str
+
+    @property
+    def hint(self) -> str:
+        """What to do about it."""
+        return _HINTS[self.reason]
+
+    def error(self, name: str) -> DetectionError:
+        """Return the error to raise where the image of this name was needed."""
+        return DetectionError(f"{name}: target not found: {self.evidence}", code=self.reason, hint=self.hint)
+
+
+def relabeled(detection: Detection, permutation: IndexArray) -> Detection:
+    """Return the detection with point i called `permutation[i]`, as the symmetries of a target have it."""
+    return Detection(permutation[detection.point_ids], detection.pixels)
+
+
+def ordered(target: Target, point_ids: ArrayLike, pixels: ArrayLike) -> Detection:
+    """Return a detection in the order of the points' ids.
+
+    Where the target has symmetries the picture cannot tell its labelings apart; the one is taken whose x axis
+    points furthest to the right in the image, so that views without much roll agree.
+    """
+    ids = np.asarray(point_ids, dtype=np.int64)
+    detection = Detection(ids, pixels)
+    best = max(
+        (relabeled(detection, permutation) for permutation in target.symmetries),
+        key=lambda candidate: x_axis(target, candidate)[0],
+    )
+    order = np.argsort(best.point_ids)
+    return Detection(best.point_ids[order], best.pixels[order])
+
+
+def x_axis(target: Target, detection: Detection) -> FloatArray:
+    """Return the direction (2,) of the target's x axis in the image, in pixels per metre (affine fit)."""
+    plane = target.points[detection.point_ids, :2]
+    return affine(plane, detection.pixels)[0][0]
+
+
+def affine(source: FloatArray, destination: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return A (2, 2) and b (2,) with `destination ~ source @ A + b`, least squares over points (N, 2)."""
+    centre = source.mean(axis=0)
+    shift = destination.mean(axis=0)
+    flat = source - centre
+    A = np.asarray(np.linalg.solve(flat.T @ flat, flat.T @ (destination - shift)), dtype=np.float64)
+    return A, shift - centre @ A
+
+
+def is_mirrored(plane: FloatArray, pixels: FloatArray) -> bool:
+    """Tell whether points (N, 2) of a board appear as in a mirror, which no view of its front shows.
+
+    Both the plane of the target and the image have x to the right and y down.
+    """
+    return float(np.linalg.det(affine(plane, pixels)[0])) < 0
+
+
+def bounding_box(
+    pixels: FloatArray, share: float, least_px: float, shape: Sequence[int]
+) -> tuple[slice, slice]:
+    """Return rows and columns around points (N, 2), larger by a share of the extent or `least_px`."""
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    margin = max(least_px, share * float((high - low).max()))
+    left, top = np.maximum(np.floor(low - margin), 0).astype(int)
+    right, bottom = np.minimum(np.ceil(high + margin) + 1, [shape[1], shape[0]]).astype(int)
+    return slice(int(top), int(bottom)), slice(int(left), int(right))

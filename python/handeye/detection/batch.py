@@ -1,0 +1,104 @@
+"""Find a target in many images."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+from handeye.detection.base import Detection, Image, NotFound
+from handeye.detection.detect import VERSION, detect
+from handeye.errors import DetectionError, HandeyeError
+from handeye.types import Target
+
+
+class DetectionCache:
+    """What was found, in memory only, by content of the image, target and version of the detectors."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[bytes, tuple[int, ...], Target, int], Detection | NotFound] = {}
+
+    def detect(self, image: Image, target: Target) -> Detection | NotFound:
+        """As `handeye.detection.detect`, without doing the same work twice."""
+        key = (hashlib.blake2b(image.tobytes(), digest_size=16).digest(), image.shape, target, VERSION)
+        if key not in self._found:
+            self._found[key] = detect(image, target)
+        return self._found[key]
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What became of many images, by name.
+
+    Attributes
+    ----------
+    found
+        The detections, in the order of the images.
+    failed
+        The error of every other image: it could not be read, or the target was not found in it.
+    """
+
+    found: Mapping[str, Detection] = field(default_factory=dict[str, Detection])
+    failed: Mapping[str, HandeyeError] = field(default_factory=dict[str, HandeyeError])
+
+    def raise_if_none(self) -> None:
+        """Raise if the target was found in no image.
+
+        Raises
+        ------
+        DetectionError
+            With the first failure as example.
+        """
+        if not self.found:
+            name, error = next(iter(self.failed.items()), ("", None))
+            example = "" if error is None else f"; {name}: {error.message.removeprefix(f'{name}: ')}"
+            raise DetectionError(
+                f"the target was found in none of {len(self.failed)} images{example}",
+                code="not_detected",
+                hint=None if error is None else error.hint,
+            ) from error
+
+
+def detect_all(
+    images: Iterable[tuple[str, Callable[[], Image]]],
+    target: Target,
+    *,
+    progress: Callable[[str, Detection | HandeyeError], None] | None = None,
+    cache: DetectionCache | None = None,
+) -> Batch:
+    """Find the target in many images, one after the other; a failure stops nothing.
+
+    Parameters
+    ----------
+    images
+        Names, and functions that give the image, called one at a time: no more than one is in memory.
+    target
+        What to look for.
+    progress
+        Called after each image with its name and what came of it.
+    cache
+        Remembers what was found before; a new one by default.
+    """
+    memory = DetectionCache() if cache is None else cache
+    found: dict[str, Detection] = {}
+    failed: dict[str, HandeyeError] = {}
+    for name, load in images:
+        outcome = _one(name, load, target, memory)
+        if isinstance(outcome, Detection):
+            found[name] = outcome
+        else:
+            failed[name] = outcome
+        if progress is not None:
+            progress(name, outcome)
+    return Batch(found, failed)
+
+
+def _one(
+    name: str, load: Callable[[], Image], target: Target, cache: DetectionCache
+) -> Detection | HandeyeError:
+    try:
+        result = cache.detect(load(), target)
+    except HandeyeError as error:
+        return error
+    return result if isinstance(result, Detection) else result.error(name)

@@ -1,0 +1,63 @@
+"""Find a target of any family in an image."""
+
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import numpy as np
+
+from handeye.detection import april_grid, charuco, chessboard, circle_grid
+from handeye.detection.base import Detection, Image, NotFound, Reason
+from handeye.errors import InputError
+from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid, Target
+
+SMALLEST_SIDE_PX = 24
+# To be raised with every change of what is detected, or where.
+VERSION = 1
+
+_FINDERS: dict[type[Target], Callable[[Image, Any], Detection | NotFound]] = {
+    Chessboard: chessboard.find,
+    CircleGrid: circle_grid.find,
+    Charuco: charuco.find,
+    AprilGrid: april_grid.find,
+}
+
+
+def detect(image: Image, target: Target) -> Detection | NotFound:
+    """Find the points of a target in a grey image.
+
+    Parameters
+    ----------
+    image
+        (H, W) uint8, as `handeye.datasets.images.read_image` gives it.
+    target
+        What to look for.
+
+    Returns
+    -------
+    Detection or NotFound
+        Chessboards and circle grids are found whole or not at all; boards with markers also in part. Labels
+        are those of the target, up to its symmetries; no board is ever labeled as if seen in a mirror.
+
+    Raises
+    ------
+    InputError
+        Not a grey image of bytes, or a family of targets for which there is no detector.
+    """
+    finder = _FINDERS.get(type(target))
+    if finder is None:
+        raise InputError(f"target: no detector for the family {target.family}", code="unknown_target")
+    if image.ndim != 2 or image.dtype != np.uint8:
+        raise InputError(
+            f"image: shape {image.shape} of {image.dtype}, expected grey values (height, width) of uint8",
+            code="wrong_shape",
+            hint="read it with handeye.datasets.images.read_image, or convert it to grey",
+        )
+    if min(image.shape) < SMALLEST_SIDE_PX:
+        height, width = image.shape
+        return NotFound(Reason.IMAGE_TOO_SMALL, f"the image has only {width} x {height} pixels")
+    try:
+        return finder(np.ascontiguousarray(image), target)
+    except cv2.error as error:
+        # OpenCV asserts on some contents; to the caller that is one image without a target, not a crash.
+        return NotFound(Reason.DETECTOR_FAILED, f"OpenCV: {str(error).strip()[:200]}")

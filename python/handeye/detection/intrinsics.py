@@ -1,0 +1,201 @@
+"""Ordinary camera calibration: lens parameters from several views of one flat target.
+
+Zhang, "A flexible new technique for camera calibration" (PAMI 2000): the reprojection error over lens
+parameters and one pose for each view is minimised by Levenberg-Marquardt. It is the optimum that
+`cv2.calibrateCamera` seeks too, but for every lens of ours in the same way, with circles seen at their area
+centroids, and with the full covariance of the parameters.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from handeye import _core
+from handeye.detection.base import Detection
+from handeye.detection.bundle import Bundle, minimise
+from handeye.errors import DegenerateError, HandeyeError, InputError
+from handeye.types import LENSES, Camera, Pose, Target
+from handeye.types.arrays import FloatArray
+
+MIN_VIEWS = 3
+MIN_POINTS = 4
+# Focal lengths to begin with, in image widths: from a fisheye of 180 degrees to a field of view of 6 degrees.
+START_FOCALS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
+# Views that choose among them.
+START_VIEWS = 8
+# Parameters known no better than this (focal length and centre, in image widths) are not known.
+LARGEST_SIGMA = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class CameraCalibration:
+    """A camera calibrated from views of a target.
+
+    Attributes
+    ----------
+    camera
+        The camera, with the covariance of its parameters.
+    rmse_px
+        Root mean square of the residual's norm over all points of all views.
+    sigma_px
+        Noise of one coordinate of a point, from the residuals, for the number of parameters estimated.
+    view_rmse_px
+        As `rmse_px`, of each view.
+    poses
+        `T_camera_target` of each view.
+    rejected
+        Views that could not be used, and why.
+    """
+
+    camera: Camera
+    rmse_px: float
+    sigma_px: float
+    view_rmse_px: Mapping[str, float]
+    poses: Mapping[str, Pose]
+    rejected: Mapping[str, str]
+
+
+def calibrate_camera(
+    target: Target,
+    detections: Mapping[str, Detection],
+    size_px: tuple[int, int],
+    *,
+    lens: str = "brown_conrady_5",
+) -> CameraCalibration:
+    """Calibrate a camera from the points found in several images of one target.
+
+    Parameters
+    ----------
+    target
+        The target.
+    detections
+        Its points in each image, by name of the image.
+    size_px
+        Width and height of the images.
+    lens
+        Name of one of `handeye.types.LENSES`.
+
+    Raises
+    ------
+    InputError
+        An unknown lens, or fewer than three views with four points.
+    DegenerateError
+        The views do not determine the camera: all face the board squarely, or too few for such a lens.
+    SolveError
+        The iteration does not converge.
+    """
+    if lens not in LENSES:
+        raise InputError(f"lens {lens!r}, expected one of {', '.join(LENSES)}", code="unknown_lens")
+    rejected = {
+        name: f"{len(found)} points, at least {MIN_POINTS} are needed"
+        for name, found in detections.items()
+        if len(found) < MIN_POINTS
+    }
+    usable = {name: found for name, found in detections.items() if name not in rejected}
+    _check_number(usable)
+    parameters = _start(lens, target, usable, size_px)
+    poses: dict[str, FloatArray] = {}
+    for name, found in usable.items():
+        try:
+            poses[name] = _pose(lens, parameters, target, found)[0]
+        except HandeyeError as error:
+            rejected[name] = error.message
+    usable = {name: usable[name] for name in poses}
+    _check_number(usable)
+    ids = np.concatenate([found.point_ids for found in usable.values()])
+    start = Bundle(
+        lens=lens,
+        parameters=parameters,
+        poses=np.array(list(poses.values())),
+        points=target.points[ids],
+        radii=target.radii_m[ids],
+        pixels=np.concatenate([found.pixels for found in usable.values()]),
+        counts=np.array([len(found) for found in usable.values()]),
+    )
+    return _calibration(minimise(start), tuple(usable), size_px, rejected)
+
+
+def _calibration(
+    best: Bundle, names: tuple[str, ...], size_px: tuple[int, int], rejected: Mapping[str, str]
+) -> CameraCalibration:
+    residuals = best.residuals()
+    if residuals is None:  # `minimise` ends where all points are seen
+        raise AssertionError
+    squared = (residuals**2).sum(axis=1)
+    freedom = residuals.size - len(best.parameters) - 6 * len(best.poses)
+    if freedom <= 0:
+        raise DegenerateError(
+            f"{residuals.size} measurements for {residuals.size - freedom} unknowns: take more views",
+            code="too_few_views",
+        )
+    sigma = float(np.sqrt(squared.sum() / freedom))
+    covariance = best.parameter_covariance() * sigma**2
+    _check_determined(best.lens, covariance, size_px)
+    views = np.split(squared, np.cumsum(best.counts)[:-1])
+    return CameraCalibration(
+        camera=Camera(best.lens, best.parameters, *size_px, covariance=covariance),
+        rmse_px=float(np.sqrt(squared.mean())),
+        sigma_px=sigma,
+        view_rmse_px={name: float(np.sqrt(v.mean())) for name, v in zip(names, views, strict=True)},
+        poses={name: Pose(pose) for name, pose in zip(names, best.poses, strict=True)},
+        rejected=rejected,
+    )
+
+
+def _check_number(usable: Mapping[str, Detection]) -> None:
+    if len(usable) < MIN_VIEWS:
+        raise InputError(
+            f"{len(usable)} views with at least {MIN_POINTS} points, expected {MIN_VIEWS} or more",
+            code="too_few_views",
+            hint="take more images of the board, tilted in different directions",
+        )
+
+
+def _check_determined(lens: str, covariance: FloatArray, size_px: tuple[int, int]) -> None:
+    sigma = np.sqrt(np.diag(covariance)[:4]) / max(size_px)
+    worst = int(np.argmax(sigma))
+    if not sigma[worst] <= LARGEST_SIGMA:
+        name = LENSES[lens][worst]
+        raise DegenerateError(
+            f"the views do not determine {name}: its deviation is {sigma[worst]:.0%} of the image width",
+            code="camera_not_determined",
+            hint="tilt the board by 30 to 50 degrees, in different directions",
+        )
+
+
+def _start(
+    lens: str, target: Target, usable: Mapping[str, Detection], size_px: tuple[int, int]
+) -> FloatArray:
+    """Return parameters without distortion whose focal length fits some of the views best."""
+    chosen = list(usable.values())[:: max(1, len(usable) // START_VIEWS)]
+    centre = [(size_px[0] - 1) / 2, (size_px[1] - 1) / 2]
+    best, least = np.zeros(0), np.inf
+    for share in START_FOCALS:
+        focal = share * size_px[0]
+        parameters = np.array([focal, focal, *centre, *np.zeros(len(LENSES[lens]) - 4)])
+        errors = [_error(lens, parameters, target, found) for found in chosen]
+        # The median: one view with a wrong label must not decide.
+        error = float(np.median(errors))
+        if error < least:
+            best, least = parameters, error
+    if not np.isfinite(least):
+        raise DegenerateError(
+            "no view of the target looks like that of a flat board",
+            code="camera_not_determined",
+            hint="check rows, columns and pitch of the target",
+        )
+    return best
+
+
+def _error(lens: str, parameters: FloatArray, target: Target, found: Detection) -> float:
+    try:
+        return _pose(lens, parameters, target, found)[1]
+    except HandeyeError:
+        return np.inf
+
+
+def _pose(lens: str, parameters: FloatArray, target: Target, found: Detection) -> tuple[FloatArray, float]:
+    points, radii = target.points[found.point_ids], target.radii_m[found.point_ids]
+    best, _ = _core.planar_pose(lens, parameters, points, radii, found.pixels)
+    return best[0], best[1]
