@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cells import Cell
 
+from cells import Cell
 from handeye import _core
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, rank
 from handeye.solving import Estimate, Measurements, Sight, make_estimator

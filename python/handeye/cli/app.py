@@ -1,6 +1,16 @@
 """The commands and where they live; a command's module is imported when it runs."""
 
-from cyclopts import App
+from cyclopts import App, Parameter
+
+# Name, where it is, and the line that lists it; its own help is its docstring.
+COMMANDS = (
+    ("solve", "handeye.cli.solve:solve", "Calibrate from a folder of views."),
+    ("plan", "handeye.cli.plan:plan", "Rank the views to take next."),
+    ("validate", "handeye.cli.validate:validate", "Test how far a calibration holds."),
+    ("import", "handeye.cli.importing:import_folder", "Turn images and robot poses into a recording."),
+    ("demo", "handeye.cli.demo:demo", "Show what choosing views is worth."),
+    ("study", "handeye.cli.study:study", "Compare policies and models on public data."),
+)
 
 
 def version() -> str:
@@ -10,27 +20,21 @@ def version() -> str:
     return f"handeye {installed('handeye')}"
 
 
-def make_app() -> App:
-    """Return the command line as a whole."""
+def make_app(named: str = "") -> App:
+    """Return the command line as a whole; the command that is named explains itself."""
     app = App(
         name="handeye",
         help="Hand-eye calibration that says which view to take next, when to stop, and how far to trust it.",
-        help_format="plaintext",
+        # Markdown joins the lines of a docstring; it takes a while to load, and the list has none.
+        help_format="markdown" if named else "plaintext",
         help_epilogue="handeye COMMAND --help explains a command. Exit codes: 0 good, 1 mistake in handeye, "
-        "2 usage, 3 unusable input, 4 degenerate geometry, 5 failed detection, 6 not solved, 7 cannot write, "
-        "130 interrupted.",
+        "2 usage, 3 unusable input, 4 degenerate geometry, 5 failed detection, 6 not solved, "
+        "7 cannot write, 130 interrupted.",
         version=version,
+        default_parameter=Parameter(negative=()),
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )
-    app.command("handeye.cli.solve:solve", name="solve", help="Calibrate from a folder of views.")
-    app.command("handeye.cli.plan:plan", name="plan", help="Rank the views to take next.")
-    app.command("handeye.cli.validate:validate", name="validate", help="Test how far a calibration holds.")
-    app.command(
-        "handeye.cli.importing:import_folder",
-        name="import",
-        help="Turn a folder of images and poses into a recording.",
-    )
-    app.command("handeye.cli.demo:demo", name="demo", help="Show what choosing views is worth.")
-    app.command("handeye.cli.study:study", name="study", help="Compare the policies on public data.")
+    for order, (name, place, line) in enumerate(COMMANDS):
+        app.command(place, name=name, help=None if name == named else line, sort_key=order)
     return app

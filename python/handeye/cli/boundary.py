@@ -11,6 +11,7 @@ from cyclopts import CycloptsError
 
 from handeye.cli.answer import Answer, json_text
 from handeye.cli.app import make_app
+from handeye.cli.failures import UnexpectedError, UsageError
 from handeye.errors import ExitCode, HandeyeError
 
 REPORT = (
@@ -24,7 +25,8 @@ def run(arguments: Sequence[str]) -> int:
     options = list(arguments)[: list(arguments).index("--")] if "--" in arguments else list(arguments)
     as_json, debug = "--json" in options, "--debug" in options
     try:
-        answer: Any = make_app()(list(arguments), exit_on_error=False, print_error=False)
+        app = make_app(next(iter(arguments), ""))
+        answer: Any = app(list(arguments), exit_on_error=False, print_error=False)
         if isinstance(answer, Answer):
             _print(answer, as_json=as_json)
         sys.stdout.flush()
@@ -48,20 +50,6 @@ def run(arguments: Sequence[str]) -> int:
         return _fail(_unexpected(error), as_json=as_json, debug=debug)
     except Exception as error:  # noqa: BLE001 - the boundary
         return _fail(_unexpected(error), as_json=as_json, debug=debug)
-
-
-class UsageError(HandeyeError):
-    """The command line is not understood."""
-
-    exit_code = ExitCode.USAGE
-    default_code = "usage"
-
-
-class UnexpectedError(HandeyeError):
-    """Something that should not have happened."""
-
-    exit_code = ExitCode.UNEXPECTED
-    default_code = "unexpected"
 
 
 def _usage(error: CycloptsError) -> HandeyeError:

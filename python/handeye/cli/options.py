@@ -11,7 +11,7 @@ from cyclopts import Parameter
 class Common:
     """Options of every command; the boundary obeys them, so commands only pass them on."""
 
-    json: Annotated[bool, Parameter(negative=(), show_default=False)] = False
+    json: Annotated[bool, Parameter(show_default=False)] = False
     """Print one JSON object instead of text."""
-    debug: Annotated[bool, Parameter(negative=(), show_default=False)] = False
+    debug: Annotated[bool, Parameter(show_default=False)] = False
     """Show where an error arose."""

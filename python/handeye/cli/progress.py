@@ -5,20 +5,31 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def progress(description: str, total: int) -> Generator[Callable[[int], None]]:
-    """Give a function that says how many of `total` steps are done.
+def progress(description: str) -> Generator[Callable[[int, int], None]]:
+    """Give a function that says how many steps are done, of how many.
 
-    A bar on a terminal; elsewhere, such as in a log, one line.
+    From the first call on: a bar on a terminal; elsewhere, such as in a log, one line.
     """
     from rich.console import Console  # noqa: PLC0415 - only commands with long work need it
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn  # noqa: PLC0415
 
     console = Console(stderr=True)
-    if not console.is_terminal:
-        console.print(f"{description} ({total}) ...", highlight=False, markup=False)
-        yield lambda _: None
-        return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(description, total=total)
-        yield lambda done: bar.update(task, completed=done)
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    task = bar.add_task(description, start=False)
+    begun = False
+
+    def advance(done: int, total: int) -> None:
+        nonlocal begun
+        if not begun:
+            begun = True
+            bar.start()
+            bar.start_task(task)
+            if not console.is_terminal:
+                console.print(f"{description} ({total}) ...", highlight=False, markup=False)
+        bar.update(task, completed=done, total=total)
+
+    try:
+        yield advance
+    finally:
+        bar.stop()

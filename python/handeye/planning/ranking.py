@@ -74,6 +74,7 @@ def rank(
     criterion: _core.Criterion,
     sight: Sight | None = None,
     *,
+    gains: FloatArray | None = None,
     top: int | None = None,
 ) -> Ranking:
     """Rank the candidates of a pool by gain; the first of equals stays first.
@@ -88,6 +89,8 @@ def rank(
         What a view is worth.
     sight
         What a candidate must show of the target.
+    gains
+        (N,) gains of the candidates as a planner sees them; None for those of the estimate.
     top
         Number of prospects wanted; None for all.
     """
@@ -96,7 +99,8 @@ def rank(
         return Ranking((), {}, 0)
     motions = pool.motions(estimate.mounting)
     hidden = obstacles(estimate, motions, sight)
-    gains = estimate.gains(criterion, motions, sight)
+    if gains is None:
+        gains = estimate.gains(criterion, motions, sight)
     infeasible = {
         candidate.name: why or "the gain cannot be computed"
         for candidate, why, gain in zip(pool.candidates, hidden, gains, strict=True)

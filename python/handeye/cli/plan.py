@@ -1,0 +1,253 @@
+"""`handeye plan`: which view to take next, from those recorded or from poses in a file."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from handeye import _core
+from handeye.cli.answer import Answer
+from handeye.cli.failures import UsageError
+from handeye.cli.options import Common
+from handeye.cli.output import check_output, write_json
+from handeye.cli.source import Source
+from handeye.datasets import read_poses_csv
+from handeye.errors import InputError
+from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
+from handeye.solving import Estimate, Measurements, Sight, make_estimator
+from handeye.types.calibration import MM_PER_M, ModelName
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+# Views that count as taken where nothing is said, and candidates that the text shows.
+FIRST = 3
+SHOWN = 10
+
+
+class Criterion(StrEnum):
+    """Names of the core's criteria, which has the formulas."""
+
+    ENTROPY = "entropy"
+    ENTROPY_HANDEYE = "entropy_handeye"
+    TRACE = "trace"
+    EIGENVALUE_SUM = "eigenvalue_sum"
+    MIN_EIGENVALUE = "min_eigenvalue"
+    TOOL_POINT = "tool_point"
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """Everything that is shown."""
+
+    recording: str
+    criterion: str
+    used: tuple[str, ...]
+    warnings: tuple[str, ...]
+    estimate: Estimate
+    ranking: Ranking
+
+
+def plan(
+    folder: Path,
+    /,
+    *,
+    used: Annotated[tuple[str, ...] | None, Parameter(consume_multiple=True)] = None,
+    first: int | None = None,
+    candidates: Path | None = None,
+    criterion: Criterion = Criterion.ENTROPY,
+    tool_point_mm: tuple[float, float, float] | None = None,
+    model: ModelName = ModelName.AUTO,
+    top: int | None = None,
+    margin_px: float = 0.0,
+    fewest: int | None = None,
+    output: Path | None = None,
+    source: Source = Source(),  # noqa: B008 - frozen
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Rank the views to take next, each with the accuracy predicted after it.
+
+    Some views of the folder count as taken; candidates are its other views, or the robot poses of a CSV file.
+    A candidate from a file must show the whole target by the current estimate; those that do not are listed
+    with the reason. No robot is moved.
+
+    Parameters
+    ----------
+    folder
+        Folder with the views.
+    used
+        Names of the views that count as taken; all others are candidates.
+    first
+        The first so many views count as taken. Without this and --used: the first three, or with --candidates
+        all.
+    candidates
+        CSV of robot poses T_base_flange: header x,y,z,qx,qy,qz,qw (metres; name too), or 16 numbers a line.
+    criterion
+        What a view is worth. entropy: all that is learnt (the paper's). entropy_handeye: of the hand-eye
+        alone. trace, eigenvalue_sum, min_eigenvalue: a millimetre weighs like a milliradian. tool_point: the
+        deviation of one point.
+    tool_point_mm
+        That point, in the camera frame: x y z.
+    model
+        auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
+    top
+        Rank only so many candidates; without it the text shows ten.
+    margin_px
+        Distance from the border of the image that a candidate from a file must keep.
+    fewest
+        Points of the target that a candidate from a file must show, if not all.
+    output
+        Also write the JSON object to this file.
+    """
+    check_output(output)
+    _check(used, first, top)
+    worth = _criterion(criterion, tool_point_mm)
+    table = None if candidates is None else read_poses_csv(candidates)
+    opened = source.open(folder)
+    measurements = Measurements.of_recording(opened.recording)
+    taken = _taken(measurements, used, first, with_file=table is not None)
+    if table is None:
+        left = [view for view in measurements.views if view.name not in taken]
+        pool, sight = Pool.of_views(left), Sight(known=True)
+    else:
+        named = zip(table.names, table.poses, strict=True)
+        pool = Pool(tuple(Candidate(name, pose) for name, pose in named))
+        sight = Sight(margin_px=margin_px, fewest=fewest)
+    names = [view.name for view in measurements.views]
+    options = PlannerOptions(criterion=worth, sight=sight)
+    planner = Planner(
+        measurements.select([names.index(name) for name in taken]), pool, make_estimator(model), options
+    )
+    ranking = rank(planner.estimate, planner.pool, options.criterion, sight, gains=planner.gains(), top=top)
+    warnings = (*opened.warnings, *(() if table is None else table.warnings))
+    found = _Plan(
+        opened.recording.name,
+        options.criterion.name,
+        taken,
+        tuple(str(warning) for warning in warnings),
+        planner.estimate,
+        ranking,
+    )
+    data = _data(found)
+    if output is not None:
+        write_json(output, data)
+    return Answer(data, lambda console: _show(console, found, top or SHOWN))
+
+
+def _criterion(name: Criterion, tool_point_mm: tuple[float, float, float] | None) -> _core.Criterion:
+    if (name is Criterion.TOOL_POINT) != (tool_point_mm is not None):
+        raise UsageError("--criterion tool_point and --tool-point-mm go together")
+    if tool_point_mm is None:
+        return _core.Criterion(name.value)
+    return _core.Criterion(name.value, tool_points=np.array([tool_point_mm]) / MM_PER_M)
+
+
+def _check(used: tuple[str, ...] | None, first: int | None, top: int | None) -> None:
+    if used is not None and first is not None:
+        raise UsageError("--used and --first exclude each other")
+    if top is not None and top < 1:
+        raise UsageError(f"--top {top}, expected at least 1")
+
+
+def _taken(
+    measurements: Measurements, used: tuple[str, ...] | None, first: int | None, *, with_file: bool
+) -> tuple[str, ...]:
+    """Return the names of the views that count as taken.
+
+    Raises
+    ------
+    InputError
+        A name that the folder does not have or whose view cannot be used, or nothing is left to rank.
+    """
+    names = [view.name for view in measurements.views]
+    if used is None:
+        count = len(names) if with_file else FIRST
+        taken = tuple(names[: count if first is None else max(first, 0)])
+    else:
+        taken = tuple(dict.fromkeys(used))
+    for name in taken:
+        if name not in names:
+            why = measurements.rejected.get(name)
+            raise InputError(
+                f"view {name!r}: {'not in the folder' if why is None else why}",
+                code="unknown_view" if why is None else "unusable_view",
+                hint=f"the views are {', '.join(names[:20])}{' ...' if len(names) > 20 else ''}",
+            )
+    if not with_file and len(taken) == len(names):
+        raise InputError(
+            f"all {len(names)} usable views count as taken, nothing is left to rank",
+            code="no_candidates",
+            hint="let fewer count as taken with --first or --used, or give poses with --candidates",
+        )
+    return taken
+
+
+def _data(found: _Plan) -> dict[str, Any]:
+    estimate = found.estimate
+    covariance = estimate.hand_eye_covariance
+    return {
+        "recording": found.recording,
+        "mounting": estimate.mounting.value,
+        "model": estimate.model.value,
+        "criterion": found.criterion,
+        "used": list(found.used),
+        "sigma_translation_mm": MM_PER_M * float(np.sqrt(np.trace(covariance[:3, :3]))),
+        "sigma_rotation_deg": float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:])))),
+        "determined": estimate.determined,
+        "unobservable": [direction.to_dict() for direction in estimate.unobservable],
+        "feasible_count": found.ranking.feasible_count,
+        "ranking": [_prospect(number, p) for number, p in enumerate(found.ranking.prospects, start=1)],
+        "infeasible": [{"name": name, "reason": why} for name, why in found.ranking.infeasible.items()],
+        "warnings": list(found.warnings),
+    }
+
+
+def _prospect(number: int, prospect: Prospect) -> dict[str, Any]:
+    return {
+        "rank": number,
+        "name": prospect.candidate.name,
+        "gain": prospect.gain,
+        "sigma_translation_mm": MM_PER_M * prospect.sigma_translation_m,
+        "sigma_rotation_deg": float(np.rad2deg(prospect.sigma_rotation_rad)),
+        "T_base_flange": prospect.candidate.T_base_flange.to_list(),
+    }
+
+
+def _show(console: "Console", found: _Plan, shown: int) -> None:
+    from rich import box  # noqa: PLC0415 - a program reading JSON need not wait for it
+    from rich.table import Table  # noqa: PLC0415
+
+    from handeye.cli.wording import MOUNTINGS, both, figures, heading, notices, open_directions  # noqa: PLC0415
+
+    data, estimate, ranking = _data(found), found.estimate, found.ranking
+    heading(
+        console,
+        found.recording,
+        f"{MOUNTINGS[estimate.mounting]}, {len(found.used)} views taken, model {estimate.model}, "
+        f"criterion {found.criterion}",
+    )
+    now = both(data["sigma_translation_mm"] / MM_PER_M, np.deg2rad(data["sigma_rotation_deg"]))
+    known = f"{now} (one standard deviation)" if estimate.determined else "not determined yet, see below"
+    console.print(f"Now: {known}. Predicted after one more view:\n")
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("rank", justify="right")
+    table.add_column("view" if ranking.prospects else "no view can be taken")
+    for name in ("gain", "sigma mm", "sigma deg"):
+        table.add_column(name, justify="right")
+    for number, prospect in enumerate(ranking.prospects[:shown], start=1):
+        millimetres = figures(MM_PER_M * prospect.sigma_translation_m)
+        degrees = figures(float(np.rad2deg(prospect.sigma_rotation_rad)), 2)
+        row = (str(number), prospect.candidate.name, f"{prospect.gain:.3f}", millimetres, degrees)
+        table.add_row(*row, style="bold" if number == 1 else "")
+    console.print(table)
+    beyond = ranking.feasible_count - min(shown, len(ranking.prospects))
+    if beyond > 0:
+        console.print(f"and {beyond} more (--top shows them)")
+    cannot = [f"{name}: {why}" for name, why in ranking.infeasible.items()]
+    more = [f"and {len(cannot) - shown} more (--json lists them)"] if len(cannot) > shown else []
+    notices(console, "Cannot be taken", [*cannot[:shown], *more])
+    open_directions(console, estimate.unobservable)
+    notices(console, "Warnings", found.warnings)

@@ -1,0 +1,152 @@
+"""`handeye solve`: the answer for a folder of views."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from handeye.cli.answer import Answer
+from handeye.cli.options import Common
+from handeye.cli.output import check_output, write_json
+from handeye.cli.source import Source
+from handeye.evaluation.region import Ellipsoid, position_region
+from handeye.importing import Opened
+from handeye.solving import solve as solve_recording
+from handeye.types.calibration import Calibration, ModelName, RobotSide
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def solve(
+    folder: Path,
+    /,
+    *,
+    model: ModelName = ModelName.AUTO,
+    reduced: bool = False,
+    output: Path | None = None,
+    source: Source = Source(),  # noqa: B008 - frozen
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Calibrate from a folder of views.
+
+    The folder is a recording (docs: conventions), or images and poses in the layout of rwhe-calib or
+    robot_cal_tools; then the target is found in the images first and, if the files hold no camera, the camera
+    is calibrated from the same images. Nothing in the folder is changed.
+
+    Parameters
+    ----------
+    folder
+        Folder with the views.
+    model
+        auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
+    reduced
+        Answer even where the views leave directions open, such as for an arm with four axes.
+    output
+        Also write the JSON object to this file.
+    """
+    check_output(output)
+    opened = source.open(folder)
+    calibration = solve_recording(opened.recording, model, reduced=reduced)
+    region = position_region(calibration)
+    data = _data(opened, calibration, region)
+    if output is not None:
+        write_json(output, data)
+    return Answer(data, lambda console: _show(console, opened, calibration, region, output))
+
+
+def _data(opened: Opened, calibration: Calibration, region: Ellipsoid) -> dict[str, Any]:
+    data = calibration.to_dict()
+    data["views"]["rejected"] += [{"name": name, "reason": why} for name, why in opened.missed.items()]
+    data["warnings"] = [str(warning) for warning in opened.warnings] + data["warnings"]
+    return {
+        "recording": opened.recording.name,
+        "layout": opened.layout,
+        "source": opened.recording.source,
+        **data,
+        "camera_origin": opened.camera_origin.value,
+        "position_region": region.to_dict(),
+    }
+
+
+def _show(
+    console: "Console", opened: Opened, calibration: Calibration, region: Ellipsoid, output: Path | None
+) -> None:
+    from handeye.cli.wording import (  # noqa: PLC0415 - a program reading JSON need not wait for it
+        MOUNTINGS,
+        both,
+        deviations_in,
+        figures,
+        heading,
+        notices,
+        open_directions,
+        pairs,
+        pose_lines,
+    )
+
+    used = [view for view in calibration.views if view.used]
+    left_out = {view.name: view.reason for view in calibration.views if not view.used} | dict(opened.missed)
+    heading(
+        console,
+        opened.recording.name,
+        f"{MOUNTINGS[calibration.mounting]}, {len(used)} views used, {len(left_out)} left out, "
+        f"model {calibration.model}",
+    )
+    camera_name, target_name = calibration.mounting.result_names
+    frame = camera_name.split("_")[1]
+    camera, target = calibration.results[camera_name], calibration.results[target_name]
+    console.print()
+    heading(console, camera_name, f"the camera in the {frame} frame")
+    lines = pose_lines(camera)
+    sigmas = " ".join(
+        f"{figures(1e3 * float(s), 2):>6}" for s in deviations_in(camera.rotation, calibration.covariance)
+    )
+    lines.insert(1, ("  one sigma", f"{sigmas}  mm, along the axes of the {frame}"))
+    pairs(console, lines, indent=2)
+    console.print()
+    heading(console, target_name, f"the target in the {target_name.split('_')[1]} frame")
+    pairs(console, pose_lines(target), indent=2)
+    console.print()
+    axes = " x ".join(figures(1e3 * float(length), 2) for length in region.semi_axes_m)
+    worst = max(used, key=lambda view: view.rmse_px)
+    accuracy = both(calibration.sigma_translation_m, calibration.sigma_rotation_rad)
+    residuals = f"{figures(calibration.rmse_px)} px RMS, worst view {worst.name}: {figures(worst.rmse_px)} px"
+    pairs(
+        console,
+        [
+            ("accuracy", f"{accuracy} (one standard deviation of position and rotation)"),
+            ("95 % region", f"position within an ellipsoid of semi-axes {axes} mm"),
+            ("residuals", residuals),
+            ("noise", _noise(calibration)),
+            ("camera", _camera(opened)),
+        ],
+    )
+    notices(console, "Left out", (f"{name}: {why}" for name, why in left_out.items()))
+    open_directions(console, calibration.unobservable)
+    notices(console, "Diagnosis", (finding.sentence for finding in calibration.diagnosis), "cyan")
+    notices(console, "Warnings", [*map(str, opened.warnings), *calibration.warnings])
+    if output is not None:
+        console.print(f"written: {output}")
+
+
+def _noise(calibration: Calibration) -> str:
+    from handeye.cli.wording import both, figures  # noqa: PLC0415
+
+    noise = calibration.noise
+    pixel = f"{figures(noise.to_dict()['pixel_sigma_px'], 2)} px in the images"
+    if noise.robot_side is RobotSide.NONE:
+        return f"{pixel}; robot poses taken as exact"
+    share = noise.evidence.get(noise.robot_side.value)
+    certainty = "" if share is None else f" (probability {'over 99 %' if share > 0.99 else f'{share:.0%}'})"
+    robot = both(noise.robot_translation_m, noise.robot_rotation_rad)
+    return f"{pixel}; robot {robot} per axis, on the side of the {noise.robot_side}{certainty}"
+
+
+def _camera(opened: Opened) -> str:
+    camera = opened.recording.camera
+    origin = {
+        "given": "as given",
+        "files": "from the files",
+        "calibrated": "calibrated from these images",
+    }[opened.camera_origin]
+    fx, fy = camera.parameters[:2]
+    size = f"{camera.width_px} x {camera.height_px} px"
+    return f"{camera.lens}, f {fx:.1f} and {fy:.1f} px, {size}, {origin}"

@@ -1,0 +1,77 @@
+"""The options that say how to read a folder, for every command that takes one."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from handeye.cli.failures import UsageError
+from handeye.cli.progress import progress
+from handeye.datasets import read_camera, read_target
+from handeye.importing import Opened, SourceOptions, open_folder
+from handeye.types import Chessboard, Mounting, Target
+
+
+@Parameter(name="*", group="What the files leave open")
+@dataclass(frozen=True)
+class Source:
+    """What the files of a folder may leave open; a recording of ours leaves nothing open but the camera."""
+
+    rows: int | None = None
+    """Rows of inner corners of the chessboard."""
+    columns: int | None = None
+    """Columns of inner corners of the chessboard."""
+    pitch_mm: float | None = None
+    """Side of its squares, where the files do not say."""
+    target: Path | None = None
+    """Target of any family, in TOML or JSON with the fields of [target] in a recording."""
+    camera: Path | None = None
+    """Camera, in TOML or JSON with the fields of [camera] in a recording, or ROS's camera_info .yaml."""
+    mounting: Mounting | None = None
+    """Where the camera sits."""
+    layout: Annotated[str | None, Parameter(help="Layout of the files, where several fit.")] = None
+
+    def options(self) -> SourceOptions:
+        """Return the options as the library takes them.
+
+        Raises
+        ------
+        UsageError
+            Half a pattern, or a pattern and a target.
+        InputError
+            A file of a target or camera that cannot be used.
+        """
+        target, pattern = self._target()
+        return SourceOptions(
+            layout=self.layout,
+            target=target,
+            pattern=pattern,
+            mounting=self.mounting,
+            camera=None if self.camera is None else read_camera(self.camera),
+        )
+
+    def _target(self) -> tuple[Target | None, tuple[int, int] | None]:
+        if self.target is not None:
+            if (self.rows, self.columns, self.pitch_mm) != (None, None, None):
+                raise UsageError("--target says it all", hint="leave --rows, --columns and --pitch-mm away")
+            return read_target(self.target), None
+        if self.rows is None or self.columns is None:
+            if (self.rows, self.columns, self.pitch_mm) != (None, None, None):
+                raise UsageError("--rows and --columns go together", hint="count inner corners, not squares")
+            return None, None
+        if self.pitch_mm is None:
+            return None, (self.rows, self.columns)
+        return Chessboard(self.rows, self.columns, self.pitch_mm / 1000), None
+
+    def open(self, folder: Path) -> Opened:
+        """Read a folder, with progress where the target has to be found in images first.
+
+        Raises
+        ------
+        UsageError, InputError, DetectionError
+            As `options` and `handeye.importing.open_folder`.
+        """
+        options = self.options()
+        with progress("Looking for the target in the images") as advance:
+            return open_folder(folder, options, progress=advance)

@@ -1,0 +1,193 @@
+"""One door for whoever has a folder: recordings pass, images are searched for the target first."""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+
+from handeye.datasets import DataWarning, ImageSet, LoadedRecording, Shot, load, recording_warnings
+from handeye.datasets.images import read_image
+from handeye.detection import Detection, Image, calibrate_camera, detect_all
+from handeye.errors import HandeyeError, InputError
+from handeye.types import Camera, Mounting, Recording, Target
+
+
+class CameraOrigin(StrEnum):
+    """Where the camera's parameters came from."""
+
+    GIVEN = "given"
+    """From the caller."""
+    FILES = "files"
+    """From the folder."""
+    CALIBRATED = "calibrated"
+    """From an ordinary camera calibration of the same images."""
+
+
+@dataclass(frozen=True)
+class SourceOptions:
+    """What the files of a folder may leave open.
+
+    Parameters
+    ----------
+    layout
+        Name of the layout; None to recognise it.
+    target
+        The calibration target; takes the place of what the files say.
+    pattern
+        Rows and columns of inner corners of a chessboard whose square size is in the files.
+    mounting
+        Where the camera sits; None for what the files say, or else in the hand.
+    camera
+        The camera; None for what the files say, or else calibrated from the images.
+    """
+
+    layout: str | None = None
+    target: Target | None = None
+    pattern: tuple[int, int] | None = None
+    mounting: Mounting | None = None
+    camera: Camera | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A recording and how it came about.
+
+    Attributes
+    ----------
+    recording
+        Ready to be solved.
+    folder
+        Where it was read from; images are relative to it.
+    layout
+        Name of the layout, `handeye` for a recording.
+    camera_origin
+        Where the camera's parameters came from.
+    missed
+        Name of each image without the target, and why.
+    warnings
+        Values that are possible but hardly meant.
+    """
+
+    recording: Recording
+    folder: Path
+    layout: str
+    camera_origin: CameraOrigin
+    missed: Mapping[str, str] = field(default_factory=dict[str, str])
+    warnings: tuple[DataWarning, ...] = ()
+
+
+def open_folder(
+    path: str | os.PathLike[str],
+    options: SourceOptions | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> Opened:
+    """Read a folder of any known layout; where there are only images, find the target in them.
+
+    Parameters
+    ----------
+    path
+        The folder.
+    options
+        What its files leave open.
+    progress
+        Called with the number of images done and of all images, first with none done.
+
+    Raises
+    ------
+    InputError
+        Nothing that can be read, an image missing or damaged, or too few views to calibrate the camera from.
+    DegenerateError
+        The views do not determine the camera.
+    DetectionError
+        The target is in none of the images.
+    """
+    options = options or SourceOptions()
+    loaded = load(
+        path,
+        layout=options.layout,
+        target=options.target,
+        pattern=options.pattern,
+        mounting=options.mounting,
+    )
+    if isinstance(loaded, LoadedRecording):
+        return _of_recording(loaded, options.camera)
+    return _of_images(loaded, options.camera, progress or _nothing)
+
+
+def _nothing(done: int, total: int) -> None:
+    """Be the progress of whoever wants none."""
+
+
+def _of_recording(loaded: LoadedRecording, camera: Camera | None) -> Opened:
+    if camera is None:
+        return Opened(
+            loaded.recording, loaded.folder, "handeye", CameraOrigin.FILES, warnings=loaded.warnings
+        )
+    recording = replace(loaded.recording, camera=camera)
+    return Opened(
+        recording, loaded.folder, "handeye", CameraOrigin.GIVEN, warnings=recording_warnings(recording)
+    )
+
+
+def _of_images(images: ImageSet, given: Camera | None, progress: Callable[[int, int], None]) -> Opened:
+    found, missed, size = _detect(images, progress)
+    camera, origin = _camera(images, given, found, size)
+    views = [
+        shot.with_points(found[shot.name].point_ids, found[shot.name].pixels)
+        for shot in images.shots
+        if shot.name in found
+    ]
+    recording = images.recording(camera, views)
+    # What both the set and the recording made of it look at is said once.
+    warnings = {warning.code: warning for warning in (*images.warnings, *recording_warnings(recording))}
+    return Opened(recording, images.folder, images.layout, origin, missed, tuple(warnings.values()))
+
+
+def _detect(
+    images: ImageSet, progress: Callable[[int, int], None]
+) -> tuple[Mapping[str, Detection], dict[str, str], tuple[int, int]]:
+    """Find the target in the images; what was found, why the others have nothing, and the size of the images.
+
+    Raises
+    ------
+    InputError
+        An image is missing or damaged: that is an accident, not a view without the target.
+    DetectionError
+        The target is in no image.
+    """
+    total, done = len(images.shots), 0
+    size = images.image_size_px or (0, 0)
+
+    def read(shot: Shot) -> Image:
+        nonlocal size
+        image = read_image(images.image_path(shot))
+        size = (image.shape[1], image.shape[0])
+        return image
+
+    def count(name: str, outcome: Detection | HandeyeError) -> None:
+        nonlocal done
+        if isinstance(outcome, InputError):
+            where = f"image of view {name}"
+            raise InputError(f"{where}: {outcome.message}", code=outcome.code, hint=outcome.hint) from outcome
+        done += 1
+        progress(done, total)
+
+    progress(done, total)
+    readers = [(shot.name, partial(read, shot)) for shot in images.shots]
+    batch = detect_all(readers, images.target, progress=count)
+    batch.raise_if_none()
+    missed = {name: error.message.removeprefix(f"{name}: ") for name, error in batch.failed.items()}
+    return batch.found, missed, size
+
+
+def _camera(
+    images: ImageSet, given: Camera | None, found: Mapping[str, Detection], size: tuple[int, int]
+) -> tuple[Camera, CameraOrigin]:
+    if given is not None:
+        return given, CameraOrigin.GIVEN
+    if images.camera is not None:
+        return images.camera, CameraOrigin.FILES
+    return calibrate_camera(images.target, found, size).camera, CameraOrigin.CALIBRATED
