@@ -1,9 +1,12 @@
 """From a recording to a calibration: the one entry for whoever has views already."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from handeye.errors import DegenerateError
 from handeye.solving.auto import AutoEstimator
+from handeye.solving.blame import blame
 from handeye.solving.estimate import Estimate, Estimator, regular_information
 from handeye.solving.initialize import check_views
 from handeye.solving.measurements import Measurements
@@ -53,7 +56,10 @@ def calibrate(
     if not estimate.determined and not reduced:
         sentences = list(dict.fromkeys(direction.sentence for direction in estimate.unobservable))
         raise DegenerateError("; ".join(sentences), hint=estimate.unobservable[0].cure)
-    return to_calibration(measurements, estimate)
+    calibration = to_calibration(measurements, estimate)
+    if calibration.model is ModelName.PAPER or not estimate.determined:
+        return calibration
+    return replace(calibration, diagnosis=(*calibration.diagnosis, blame(measurements, estimate)))
 
 
 def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibration:

@@ -1,0 +1,64 @@
+"""The one thing that is wrong is the one that is named."""
+
+import re
+
+import numpy as np
+import pytest
+
+from cells import Cell
+from handeye.solving import AutoEstimator, Measurements
+from handeye.solving.blame import blame
+from handeye.types import Camera, Chessboard, Mounting, Pose, View
+from handeye.types.arrays import FloatArray
+
+VIEWS = 14
+
+
+def measured(cell: Cell, *, base_sigma: float = 0.0, flange_sigma: float = 0.0) -> Measurements:
+    views: list[View] = []
+    for i in range(VIEWS):
+        pose = cell.robot_pose(cell.look())
+        base = Pose.exp(cell.random.normal(size=6) * base_sigma)
+        flange = Pose.exp(cell.random.normal(size=6) * flange_sigma)
+        views.append(cell.view(f"view_{i:02d}", pose, sigma_px=0.1, reported=base @ pose @ flange))
+    deviations = np.array([0.5, 0.5, 0.5, 0.5, 1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
+    camera = Camera(cell.camera.lens, cell.camera.parameters, 1280, 1024, np.diag(deviations**2))
+    return Measurements.of(cell.mounting, camera, cell.target, views)
+
+
+def verdict(measurements: Measurements) -> str:
+    return blame(measurements, AutoEstimator()(measurements)).code
+
+
+@pytest.mark.parametrize("mounting", list(Mounting))
+class TestBlame:
+    def test_nothing(self, mounting: Mounting) -> None:
+        assert verdict(measured(Cell(np.random.default_rng(1), mounting))) == "blame_nothing"
+
+    def test_the_robot_and_its_side(self, mounting: Mounting) -> None:
+        cell = Cell(np.random.default_rng(2), mounting)
+        assert verdict(measured(cell, base_sigma=1.5e-3)) == "blame_robot_base"
+        assert verdict(measured(cell, flange_sigma=1.5e-3)) == "blame_robot_flange"
+
+    def test_the_board(self, mounting: Mounting) -> None:
+        cell = Cell(np.random.default_rng(3), mounting)
+        measurements = measured(cell)
+        wrong = Measurements.of(mounting, measurements.camera, Chessboard(7, 9, 0.0302), measurements.views)
+        finding = blame(wrong, AutoEstimator()(wrong))
+        assert finding.code == "blame_board_scale"
+        assert re.search(r"0\.6[4-8] % smaller than stated", finding.sentence)
+
+    def test_the_camera(self, mounting: Mounting) -> None:
+        cell = Cell(np.random.default_rng(4), mounting)
+        measurements = measured(cell)
+        parameters = np.array(measurements.camera.parameters)
+        parameters[:4] += [6.0, 6.0, -4.0, 3.0]
+        camera = replace_parameters(measurements.camera, parameters)
+        wrong = Measurements.of(mounting, camera, cell.target, measurements.views)
+        finding = blame(wrong, AutoEstimator()(wrong))
+        assert finding.code == "blame_camera"
+        assert "fx -6" in finding.sentence or "fx -5" in finding.sentence
+
+
+def replace_parameters(camera: Camera, parameters: FloatArray) -> Camera:
+    return Camera(camera.lens, parameters, camera.width_px, camera.height_px, camera.covariance)
