@@ -4,7 +4,15 @@ from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.planner import Planner, PlannerOptions, Proposal, Verdict, replay
 from handeye.planning.policies import POLICIES, Policy, make_policy
 from handeye.planning.ranking import Prospect, Ranking, rank
-from handeye.planning.stopping import Accuracy, GainThreshold, NumberOfViews, Stop, StopReason, StopRule
+from handeye.planning.stopping import (
+    Accuracy,
+    GainThreshold,
+    NumberOfViews,
+    Stop,
+    StopReason,
+    StopRule,
+    ToolAccuracy,
+)
 
 __all__ = [
     "POLICIES",
@@ -22,6 +30,7 @@ __all__ = [
     "Stop",
     "StopReason",
     "StopRule",
+    "ToolAccuracy",
     "Verdict",
     "make_policy",
     "rank",

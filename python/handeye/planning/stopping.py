@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from handeye.errors import InputError
+from handeye.solving.accuracy import tool_deviations_m
 from handeye.solving.estimate import Estimate
 from handeye.types.arrays import FloatArray
 
@@ -115,6 +116,36 @@ class Accuracy(StopRule):
             StopReason.ACCURACY_REACHED,
             f"predicted standard deviation {translation:.2g} mm and {rotation:.2g} deg, as asked",
             {"sigma_translation_mm": translation, "sigma_rotation_deg": rotation},
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ToolAccuracy(StopRule):
+    """Stop when the predicted standard deviation at tool points is small enough.
+
+    Parameters
+    ----------
+    points_camera_m
+        (P, 3) points in the camera frame, metres: a tool centre point, or the corners of a working box.
+    sigma_mm
+        What the worst of them may have.
+    """
+
+    points_camera_m: FloatArray
+    sigma_mm: float
+
+    def verdict(self, state: State) -> Stop | None:
+        """Stop once the worst point is good enough."""
+        if not state.estimate.determined:
+            return None
+        deviations = tool_deviations_m(state.estimate.hand_eye_covariance, self.points_camera_m) * 1e3
+        worst = float(deviations.max())
+        if worst > self.sigma_mm:
+            return None
+        return Stop(
+            StopReason.ACCURACY_REACHED,
+            f"predicted standard deviation {worst:.2g} mm at the worst of {len(deviations)} points, as asked",
+            {"worst_mm": worst, "mean_mm": float(deviations.mean()), "asked_mm": self.sigma_mm},
         )
 
 
