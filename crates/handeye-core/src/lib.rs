@@ -8,6 +8,7 @@ pub mod closed_form;
 pub mod error;
 pub mod evidence;
 pub mod information;
+pub mod kinematics;
 pub mod least_squares;
 pub mod planar_pose;
 pub mod planning;

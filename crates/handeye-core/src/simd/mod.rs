@@ -17,10 +17,12 @@ mod logarithm;
 mod portable;
 #[cfg(test)]
 mod tests;
+mod trigonometry;
 
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
 pub(crate) use logarithm::ln;
+pub(crate) use trigonometry::{LARGEST_ANGLE, sin_cos};
 
 /// Doubles of the widest vector.
 pub(crate) const MAX_LANES: usize = 8;
