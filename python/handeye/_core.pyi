@@ -336,6 +336,53 @@ class Posterior:
     def hypotheses(self) -> list[tuple[str, float, float, float]]: ...
     def information(self, rank: int) -> NDArray[float64]: ...
 
+# Kinematics
+
+class Chain:
+    """A serial arm of n joints, at most 16, base first.
+
+    Joint i has the pose `placements[i]` (4, 4) in the frame of the joint before it at position zero, turns about or
+    slides along `axes[i]` (3,), and moves from `limits[i][0]` to `limits[i][1]` (radians or metres, may be infinite).
+    `tip` (4, 4) is the flange in the frame of the last joint. Raises `InputError` for what is no chain.
+    """
+
+    def __init__(
+        self, placements: ArrayLike, axes: ArrayLike, sliding: list[bool], limits: ArrayLike, tip: ArrayLike
+    ) -> None: ...
+    @property
+    def joint_count(self) -> int: ...
+    def forward(self, joints: ArrayLike) -> NDArray[float64]:
+        """`T_base_flange` (N, 4, 4) at joints (N, n)."""
+
+    def jacobians(self, joints: ArrayLike, frame: str) -> NDArray[float64]:
+        """Twists (N, 6, n) per joint: `T(q + dq) = exp(J dq) T(q)` for "base", `T(q) exp(J dq)` for "flange"."""
+
+    def inverse(
+        self,
+        goals: ArrayLike,
+        starts: ArrayLike,
+        *,
+        tolerance_m: float = 1e-9,
+        tolerance_rad: float = 1e-9,
+        steps: int = 60,
+        attempts: int = 40,
+    ) -> tuple[NDArray[float64], list[bool], list[tuple[float, float]]]:
+        """Joints (N, n) within the limits for poses (N, 4, 4), from starts (N, n) and then from others.
+
+        Also which poses are reached, and how far off (metres, radians) the nearest posture is where not.
+        """
+
+    def postures(
+        self,
+        goal: ArrayLike,
+        *,
+        tolerance_m: float = 1e-9,
+        tolerance_rad: float = 1e-9,
+        steps: int = 60,
+        attempts: int = 100,
+    ) -> NDArray[float64]:
+        """All different joints (S, n) found that reach a pose (4, 4)."""
+
 # Several views at once
 
 def select_views(

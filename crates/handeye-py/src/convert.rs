@@ -109,7 +109,7 @@ fn rigid(py: Python<'_>, name: &str, m: &Matrix4<f64>) -> PyResult<Se3> {
 }
 
 /// An array of the given shape from its entries in row-major order.
-fn array<'py>(py: Python<'py>, shape: &[usize], entries: Vec<f64>) -> Bound<'py, PyArrayDyn<f64>> {
+pub fn array<'py>(py: Python<'py>, shape: &[usize], entries: Vec<f64>) -> Bound<'py, PyArrayDyn<f64>> {
     ArrayD::from_shape_vec(IxDyn(shape), entries)
         .expect("as many entries as the shape says, by construction")
         .into_pyarray(py)

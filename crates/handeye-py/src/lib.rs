@@ -13,6 +13,7 @@ mod errors;
 mod evidence;
 mod geometry;
 mod information;
+mod kinematics;
 mod model;
 mod planar_pose;
 mod planning;
@@ -24,6 +25,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     closed_form::register(module)?;
     evidence::register(module)?;
     geometry::register(module)?;
+    kinematics::register(module)?;
     planar_pose::register(module)?;
     planning::register(module)?;
     problem::register(module)?;

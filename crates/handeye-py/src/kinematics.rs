@@ -1,0 +1,168 @@
+//! Serial arms, batched.
+
+use handeye_core::kinematics::{Chain as CoreChain, Frame, InverseOptions, Joint, JointKind};
+use numpy::{PyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::convert::{self, Array};
+use crate::errors::{invalid, to_python};
+
+/// Registers the class of this file.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Chain>()
+}
+
+/// A serial arm.
+#[pyclass(frozen, module = "handeye._core")]
+pub struct Chain {
+    inner: CoreChain,
+}
+
+impl Chain {
+    /// Configurations out of an `(N, n)` array.
+    fn configurations(&self, py: Python<'_>, joints: &Array<'_>) -> PyResult<(usize, Vec<f64>)> {
+        let shape = joints.shape();
+        if shape.len() != 2 || shape[1] != self.inner.len() {
+            return Err(invalid(
+                py,
+                &format!("joints must have shape (N, {}), found {shape:?}", self.inner.len()),
+            ));
+        }
+        let values = match joints.as_array().as_slice() {
+            Some(values) => values.to_vec(),
+            None => joints.as_array().iter().copied().collect(),
+        };
+        Ok((shape[0], values))
+    }
+}
+
+type Inverse<'py> = (Bound<'py, PyArrayDyn<f64>>, Vec<bool>, Vec<(f64, f64)>);
+
+#[pymethods]
+impl Chain {
+    #[new]
+    fn new<'py>(
+        py: Python<'py>,
+        placements: Array<'py>,
+        axes: Array<'py>,
+        sliding: Vec<bool>,
+        limits: Array<'py>,
+        tip: Array<'py>,
+    ) -> PyResult<Self> {
+        let placements = convert::transforms(py, "placements", &placements)?;
+        let axes = convert::vectors::<3>(py, "axes", &axes)?;
+        let limits = convert::vectors::<2>(py, "limits", &limits)?;
+        let n = placements.len();
+        if axes.len() != n || sliding.len() != n || limits.len() != n {
+            return Err(invalid(py, "placements, axes, sliding and limits must be as many"));
+        }
+        let joints = (0..n)
+            .map(|i| Joint {
+                kind: if sliding[i] { JointKind::Prismatic } else { JointKind::Revolute },
+                placement: placements[i],
+                axis: axes[i],
+                lower: limits[i][0],
+                upper: limits[i][1],
+            })
+            .collect();
+        let tip = convert::transform(py, "tip", &tip)?;
+        CoreChain::new(joints, tip).map(|inner| Self { inner }).map_err(|e| to_python(py, e))
+    }
+
+    /// Number of joints.
+    #[getter]
+    fn joint_count(&self) -> usize {
+        self.inner.len()
+    }
+
+    /// Poses `(N, 4, 4)` of the flange in the base at joints `(N, n)`.
+    fn forward<'py>(&self, py: Python<'py>, joints: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let (count, values) = self.configurations(py, &joints)?;
+        let poses = py
+            .detach(|| {
+                let mut poses = vec![0.0; count * 16];
+                self.inner.forward_all(&values, &mut poses).map(|()| poses)
+            })
+            .map_err(|e| to_python(py, e))?;
+        Ok(convert::array(py, &[count, 4, 4], poses))
+    }
+
+    /// Jacobians `(N, 6, n)` at joints `(N, n)`, in the frame "base" or "flange".
+    fn jacobians<'py>(
+        &self,
+        py: Python<'py>,
+        joints: Array<'py>,
+        frame: &str,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let frame = match frame {
+            "base" => Frame::Base,
+            "flange" => Frame::Flange,
+            other => {
+                return Err(invalid(py, &format!("frame must be base or flange, found \"{other}\"")));
+            }
+        };
+        let (count, values) = self.configurations(py, &joints)?;
+        let n = self.inner.len();
+        let jacobians = py
+            .detach(|| {
+                let mut jacobians = vec![0.0; count * 6 * n];
+                self.inner.jacobian_all(frame, &values, &mut jacobians).map(|()| jacobians)
+            })
+            .map_err(|e| to_python(py, e))?;
+        Ok(convert::array(py, &[count, 6, n], jacobians))
+    }
+
+    /// Joints `(N, n)` that reach poses `(N, 4, 4)`, which of them do, and how far off the others are (m, rad).
+    #[pyo3(signature = (goals, starts, *, tolerance_m=1e-9, tolerance_rad=1e-9, steps=60, attempts=40))]
+    #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
+    fn inverse<'py>(
+        &self,
+        py: Python<'py>,
+        goals: Array<'py>,
+        starts: Array<'py>,
+        tolerance_m: f64,
+        tolerance_rad: f64,
+        steps: usize,
+        attempts: usize,
+    ) -> PyResult<Inverse<'py>> {
+        let goals = convert::transforms(py, "goals", &goals)?;
+        let (count, starts) = self.configurations(py, &starts)?;
+        if count != goals.len() || starts.iter().any(|q| !q.is_finite()) {
+            return Err(invalid(py, &format!("{count} finite starts are needed for {} goals", goals.len())));
+        }
+        let options = InverseOptions { tolerance_m, tolerance_rad, steps, attempts };
+        let n = self.inner.len();
+        let mut joints = Vec::with_capacity(count * n);
+        let mut reached = Vec::with_capacity(count);
+        let mut off = Vec::with_capacity(count);
+        py.detach(|| {
+            for (goal, start) in goals.iter().zip(starts.chunks_exact(n)) {
+                let (q, found, how_far) = match self.inner.inverse(goal, start, &options) {
+                    Ok(reach) => (reach.joints, true, (0.0, 0.0)),
+                    Err(nearest) => (nearest.joints, false, (nearest.off_m, nearest.off_rad)),
+                };
+                joints.extend(q);
+                reached.push(found);
+                off.push(how_far);
+            }
+        });
+        Ok((convert::array(py, &[count, n], joints), reached, off))
+    }
+
+    /// All different postures `(S, n)` found that reach a pose `(4, 4)`.
+    #[pyo3(signature = (goal, *, tolerance_m=1e-9, tolerance_rad=1e-9, steps=60, attempts=100))]
+    fn postures<'py>(
+        &self,
+        py: Python<'py>,
+        goal: Array<'py>,
+        tolerance_m: f64,
+        tolerance_rad: f64,
+        steps: usize,
+        attempts: usize,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let goal = convert::transform(py, "goal", &goal)?;
+        let options = InverseOptions { tolerance_m, tolerance_rad, steps, attempts };
+        let found = py.detach(|| self.inner.inverse_all(&goal, &options));
+        Ok(convert::array(py, &[found.len(), self.inner.len()], found.concat()))
+    }
+}
