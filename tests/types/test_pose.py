@@ -177,7 +177,17 @@ def test_hostile_values_raise_only_our_error(value: Any) -> None:
 @given(poses(angle_rad=np.pi))
 def test_roll_pitch_yaw_agrees_with_scipy(T: Pose) -> None:
     again = Rotation.from_euler("xyz", T.roll_pitch_yaw_rad).as_matrix()
-    np.testing.assert_allclose(again, T.rotation, atol=1e-8)
+    np.testing.assert_allclose(again, T.rotation, atol=1e-12)
+
+
+@pytest.mark.parametrize("from_the_end", [0, 1e-15, 1e-13, 1e-12, 1e-10, 1e-8, 1e-6, 1e-3])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_roll_pitch_yaw_near_the_end_of_pitch(from_the_end: float, sign: int) -> None:
+    for roll, yaw in ((0.3, -0.8), (3.0, 2.9), (0, 0), (-1.2, 1.2)):
+        rotation = Rotation.from_euler("xyz", [roll, sign * (np.pi / 2 - from_the_end), yaw]).as_matrix()
+        T = Pose([[*row, 0] for row in rotation] + [[0, 0, 0, 1]])
+        again = Rotation.from_euler("xyz", T.roll_pitch_yaw_rad).as_matrix()
+        np.testing.assert_allclose(again, rotation, atol=1e-12)
 
 
 @pytest.mark.parametrize("pitch", [-np.pi / 2, np.pi / 2])
@@ -186,5 +196,5 @@ def test_roll_pitch_yaw_at_the_end_of_pitch(pitch: float) -> None:
     T = Pose([[*row, 0] for row in rotation] + [[0, 0, 0, 1]])
     assert T.roll_pitch_yaw_rad[0] == 0
     np.testing.assert_allclose(
-        Rotation.from_euler("xyz", T.roll_pitch_yaw_rad).as_matrix(), rotation, atol=1e-8
+        Rotation.from_euler("xyz", T.roll_pitch_yaw_rad).as_matrix(), rotation, atol=1e-12
     )

@@ -155,9 +155,14 @@ class Pose:
         r = self.rotation
         cosine = float(np.hypot(r[0, 0], r[1, 0]))
         pitch = np.arctan2(-r[2, 0], cosine)
-        if cosine < 1e-9:
+        if cosine < 1e-13:
             return np.array([0.0, pitch, np.arctan2(-r[0, 1], r[1, 1])])
-        return np.array([np.arctan2(r[2, 1], r[2, 2]), pitch, np.arctan2(r[1, 0], r[0, 0])])
+        yaw = np.arctan2(r[1, 0], r[0, 0])
+        # Near the ends of pitch neither yaw nor roll is well determined, but together they are: roll is what
+        # is left once yaw is taken away.
+        sine, cosine = np.sin(yaw), np.cos(yaw)
+        roll = np.arctan2(sine * r[0, 2] - cosine * r[1, 2], cosine * r[1, 1] - sine * r[0, 1])
+        return np.array([roll, pitch, yaw])
 
     @property
     def rotation_angle_rad(self) -> float:
