@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import json_text
-from handeye.datasets.writing import replace_file
+from handeye.datasets.writing import is_occupied, replace_file
 from handeye.errors import OutputError
 
 if TYPE_CHECKING:
@@ -24,6 +24,22 @@ def check_output(path: Path | None) -> None:
         return
     if path.is_dir():
         raise OutputError(f"{path}: is a folder", hint="give the name of a file")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: the folder {path.parent} does not exist", hint="create it first")
+
+
+def check_new_folder(path: Path) -> None:
+    """Refuse a folder that is there already or cannot be made, before the work rather than after it.
+
+    Raises
+    ------
+    OutputError
+        It exists and is not empty, or the folder it belongs in does not exist.
+    """
+    if is_occupied(path):
+        raise OutputError(
+            f"{path}: exists already and is not empty", code="exists", hint="choose another name"
+        )
     if not path.parent.is_dir():
         raise OutputError(f"{path}: the folder {path.parent} does not exist", hint="create it first")
 

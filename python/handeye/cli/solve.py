@@ -73,6 +73,7 @@ def _show(
     from handeye.cli.wording import (  # noqa: PLC0415 - a program reading JSON need not wait for it
         MOUNTINGS,
         both,
+        camera_line,
         deviations_in,
         figures,
         heading,
@@ -116,7 +117,7 @@ def _show(
             ("95 % region", f"position within an ellipsoid of semi-axes {axes} mm"),
             ("residuals", residuals),
             ("noise", _noise(calibration)),
-            ("camera", _camera(opened)),
+            ("camera", camera_line(opened)),
         ],
     )
     notices(console, "Left out", (f"{name}: {why}" for name, why in left_out.items()))
@@ -138,15 +139,3 @@ def _noise(calibration: Calibration) -> str:
     certainty = "" if share is None else f" (probability {'over 99 %' if share > 0.99 else f'{share:.0%}'})"
     robot = both(noise.robot_translation_m, noise.robot_rotation_rad)
     return f"{pixel}; robot {robot} per axis, on the side of the {noise.robot_side}{certainty}"
-
-
-def _camera(opened: Opened) -> str:
-    camera = opened.recording.camera
-    origin = {
-        "given": "as given",
-        "files": "from the files",
-        "calibrated": "calibrated from these images",
-    }[opened.camera_origin]
-    fx, fy = camera.parameters[:2]
-    size = f"{camera.width_px} x {camera.height_px} px"
-    return f"{camera.lens}, f {fx:.1f} and {fy:.1f} px, {size}, {origin}"

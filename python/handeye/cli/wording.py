@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from handeye.importing import Opened
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Unobservable
@@ -90,3 +91,16 @@ def open_directions(console: Console, unobservable: Sequence[Unobservable]) -> N
     sentences = [*dict.fromkeys(direction.sentence for direction in unobservable)]
     cures = [f"cure: {cure}" for cure in dict.fromkeys(direction.cure for direction in unobservable)]
     notices(console, "Not determined by these views", [*sentences, *cures], "red")
+
+
+def camera_line(opened: Opened) -> str:
+    """Return one line about the camera and where it came from."""
+    camera = opened.recording.camera
+    origin = {
+        "given": "as given",
+        "files": "from the files",
+        "calibrated": "calibrated from these images",
+    }[opened.camera_origin]
+    fx, fy = camera.parameters[:2]
+    size = f"{camera.width_px} x {camera.height_px} px"
+    return f"{camera.lens}, f {fx:.1f} and {fy:.1f} px, {size}, {origin}"

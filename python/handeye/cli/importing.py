@@ -1,0 +1,79 @@
+"""`handeye import`: from the layouts of others to a recording of ours."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from handeye.cli.answer import Answer
+from handeye.cli.options import Common
+from handeye.cli.output import check_new_folder
+from handeye.cli.source import Source
+from handeye.datasets import write_recording
+from handeye.importing import Opened
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def import_folder(
+    folder: Path,
+    destination: Path,
+    /,
+    *,
+    images: bool = False,
+    source: Source = Source(),  # noqa: B008 - frozen
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Turn a folder of images and robot poses into a recording.
+
+    The layouts of rwhe-calib and robot_cal_tools are recognised. The target is found in the images and, if
+    the files hold no camera, the camera is calibrated from them. The recording keeps corners, poses, camera
+    and target, so solving it again needs no image. A recording is copied, with another camera if given.
+
+    Parameters
+    ----------
+    folder
+        Folder with the images and poses.
+    destination
+        Folder of the recording, which does not exist yet or is empty.
+    images
+        Copy the images too.
+    """
+    check_new_folder(destination)
+    opened = source.open(folder)
+    write_recording(opened.recording, destination, images_from=opened.folder if images else None)
+    data = _data(opened, destination)
+    return Answer(data, lambda console: _show(console, opened, destination))
+
+
+def _data(opened: Opened, destination: Path) -> dict[str, Any]:
+    return {
+        "recording": opened.recording.name,
+        "layout": opened.layout,
+        "destination": str(destination),
+        "mounting": opened.recording.mounting.value,
+        "camera_origin": opened.camera_origin.value,
+        "camera": opened.recording.camera.to_dict(),
+        "target": opened.recording.target.to_dict(),
+        "views": {
+            "imported": [view.name for view in opened.recording.views],
+            "rejected": [{"name": name, "reason": why} for name, why in opened.missed.items()],
+        },
+        "warnings": [str(warning) for warning in opened.warnings],
+    }
+
+
+def _show(console: "Console", opened: Opened, destination: Path) -> None:
+    from handeye.cli.wording import MOUNTINGS, camera_line, heading, notices, pairs  # noqa: PLC0415
+
+    recording = opened.recording
+    note = f"{MOUNTINGS[recording.mounting]}, {len(recording)} views, {len(opened.missed)} without the target"
+    heading(console, recording.name, note)
+    rows = [
+        ("layout", opened.layout),
+        ("target", f"{recording.target.family}, {recording.target.point_count} points"),
+        ("camera", camera_line(opened)),
+        ("written", str(destination)),
+    ]
+    pairs(console, rows)
+    notices(console, "Left out", (f"{name}: {why}" for name, why in opened.missed.items()))
+    notices(console, "Warnings", map(str, opened.warnings))
