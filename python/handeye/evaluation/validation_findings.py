@@ -88,15 +88,15 @@ def _covariance(check: "ModelCheck") -> Iterator[Finding]:
     if nees > NEES_TOO_HIGH:
         yield Finding(
             "covariance_too_small",
-            f"halves differ {np.sqrt(nees):.2g} times as much as their covariances allow (NEES/6 {nees:.2g}): "
-            "do not rely on the stated accuracy",
+            f"halves differ {np.sqrt(nees):.2g} times as much as their covariances allow (NEES/6 {nees:.2g})"
+            ": do not rely on the stated accuracy",
             {"nees_per_dof": nees},
         )
     elif nees < NEES_TOO_LOW:
         yield Finding(
             "covariance_large",
             f"halves agree {1 / np.sqrt(nees):.2g} times better than their covariances say (NEES/6 "
-            f"{nees:.2g}): the stated accuracy allows for errors that all halves share, which agreement cannot "
+            f"{nees:.2g}): the stated accuracy allows for errors that all halves share, which halves cannot "
             "show",
             {"nees_per_dof": nees},
         )
@@ -127,8 +127,8 @@ def _residuals(check: "ModelCheck") -> Iterator[Finding]:
     if check.rmse_px > NOT_FROM_PIXELS * pixel:
         yield Finding(
             "residuals_are_the_robots",
-            f"residuals are {check.rmse_px:.2g} px where the images are good to {pixel:.2g} px: nearly all of "
-            "it is the robot (or camera and target), so small residuals would not mean a good answer",
+            f"residuals are {check.rmse_px:.2g} px where the images are good to {pixel:.2g} px: nearly all "
+            "of it is the robot (or camera and target), so small residuals would not mean a good answer",
             {"rmse_px": check.rmse_px, "image_noise_px": pixel},
         )
 
@@ -146,8 +146,8 @@ def _contradiction(check: "ModelCheck", other: "ModelCheck") -> Iterator[Finding
         yield Finding(
             "held_out_misleads",
             f"held-out residuals prefer model {other.model} ({unseen:.2g} times smaller), but its halves "
-            f"differ {1 / halves:.2g} times as much: it bends to follow the robot's error, which the held-out "
-            "views share. Believe the halves",
+            f"differ {1 / halves:.2g} times as much: it bends to follow the robot's error, which the held-"
+            "out views share. Believe the halves",
             evidence,
         )
     elif unseen < 1 / NOTABLE_RATIO and halves > NOTABLE_RATIO:
