@@ -276,6 +276,24 @@ def start_from_poses(
 ) -> tuple[NDArray[float64], NDArray[float64], float, str]:
     """X, Y, cost and origin that fit `poses[k] ~ X motions[k] Y` (K, 4, 4) from many starts, with a weak prior."""
 
+class JointErrors:
+    """How errors of the joints of an arm move the motions: truly `exp(jacobians[k] dq) @ motions[k]`.
+
+    `jacobians` (K, 6, n), one per view of the problem. `scales` (n,): what a level of one radian means for each joint,
+    1 for one that turns, metres for one that slides. `free`: joints whose offset is a parameter. Levels of the noise
+    and of the offsets are found unless given.
+    """
+
+    def __init__(
+        self,
+        jacobians: ArrayLike,
+        scales: list[float],
+        free: list[int],
+        *,
+        noise_rad: float | None = None,
+        offset_rad: float | None = None,
+    ) -> None: ...
+
 class Compressed:
     """Views of a problem, each reduced to the pose of its own image with that pose's information."""
 
@@ -304,13 +322,15 @@ class Compressed:
         exact_probability: float = ...,
         sides: list[str] | None = None,
         levels: tuple[float, float] | None = None,
+        joints: JointErrors | None = None,
         prior_degrees: float = 20.0,
         floor_px2: float = 1e-8,
         linearisations: int = 5,
     ) -> Posterior:
         """The answer from these views, averaged over a grid of robot noise levels and sides.
 
-        `levels` (metres, radians) gives them instead; then `sides` are all that is compared.
+        `levels` (metres, radians) gives them instead; then `sides` are all that is compared. With `joints` noise of
+        the joints is a further hypothesis, and their offsets are further parameters.
         """
 
 class Posterior:
@@ -324,6 +344,10 @@ class Posterior:
     def camera_delta(self) -> list[float]: ...
     @property
     def covariance(self) -> NDArray[float64]: ...
+    @property
+    def joint_offsets(self) -> list[float]: ...
+    @property
+    def joint_levels(self) -> list[tuple[float, float]]: ...
     @property
     def degrees_of_freedom(self) -> float: ...
     @property

@@ -1,8 +1,9 @@
 //! Views compressed to poses, and the answer averaged over what the robot's noise may be.
 
 use handeye_core::evidence::{
-    CompressedView, EvidenceOptions, Hypothesis, LevelPrior, Posterior as CorePosterior, WeakPrior, compress,
-    estimate, shrunk_variances, start_from_poses,
+    CompressedView, EXACT_OFFSET_RAD, EvidenceOptions, Hypothesis, JointErrors as CoreJointErrors,
+    JointPrior, LevelPrior, Posterior as CorePosterior, WeakPrior, compress, estimate, shrunk_variances,
+    start_from_poses,
 };
 use handeye_core::least_squares::{PixelParameters, Side};
 use handeye_core::se3::Se3;
@@ -12,13 +13,14 @@ use pyo3::prelude::*;
 
 use crate::convert::{self, Array};
 use crate::errors::{invalid, to_python};
-use crate::model::square;
+use crate::model::{jacobian_list, square};
 use crate::problem::Problem;
 
 /// Registers the classes and functions of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(start_from_poses_py, module)?)?;
     module.add_class::<Compressed>()?;
+    module.add_class::<JointErrors>()?;
     module.add_class::<Posterior>()
 }
 
@@ -28,10 +30,7 @@ fn weak_prior(translation_m: f64) -> WeakPrior {
 
 type Chain<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, f64, &'static str);
 
-fn given(
-    py: Python<'_>,
-    start: Option<(Array<'_>, Array<'_>)>,
-) -> PyResult<Option<(Se3, Se3)>> {
+fn given(py: Python<'_>, start: Option<(Array<'_>, Array<'_>)>) -> PyResult<Option<(Se3, Se3)>> {
     start
         .map(|(x, y)| Ok((convert::transform(py, "start X", &x)?, convert::transform(py, "start Y", &y)?)))
         .transpose()
@@ -62,6 +61,69 @@ fn start_from_poses_py<'py>(
     ))
 }
 
+/// How errors of the joints move the motions, and how large they are if that is known.
+#[pyclass(frozen, module = "handeye._core")]
+pub struct JointErrors {
+    inner: CoreJointErrors,
+    noise_rad: Option<f64>,
+    offset_rad: Option<f64>,
+}
+
+#[pymethods]
+impl JointErrors {
+    #[new]
+    #[pyo3(signature = (jacobians, scales, free, *, noise_rad=None, offset_rad=None))]
+    fn new<'py>(
+        py: Python<'py>,
+        jacobians: Array<'py>,
+        scales: Vec<f64>,
+        free: Vec<usize>,
+        noise_rad: Option<f64>,
+        offset_rad: Option<f64>,
+    ) -> PyResult<Self> {
+        let jacobians = jacobian_list(py, &jacobians)?;
+        for level in [noise_rad, offset_rad].into_iter().flatten() {
+            if !(level >= 0.0 && level.is_finite()) {
+                return Err(invalid(py, &format!("levels of joint errors cannot be {level}")));
+            }
+        }
+        Ok(Self { inner: CoreJointErrors { jacobians, scales, free }, noise_rad, offset_rad })
+    }
+}
+
+impl JointErrors {
+    /// The hypotheses about noise on the sides and in the joints, each with every level of the offsets.
+    fn hypotheses(
+        &self,
+        prior: &LevelPrior,
+        sides: &[Side],
+        given: Option<Vec<Hypothesis>>,
+    ) -> Vec<Hypothesis> {
+        let joint_prior = JointPrior::default();
+        let noise = match (given, self.noise_rad) {
+            (Some(given), _) => given,
+            (None, Some(level)) => vec![Hypothesis::joints(level, 0.0)],
+            (None, None) => prior.grid_with(sides, Some(&joint_prior.noise)),
+        };
+        match self.offset_rad {
+            Some(level) => {
+                let offset_rad = level.max(EXACT_OFFSET_RAD);
+                noise.into_iter().map(|h| Hypothesis { offset_rad, ..h }).collect()
+            }
+            None => joint_prior.with_offsets(&noise),
+        }
+    }
+
+    /// Those of the views with these numbers.
+    fn select(&self, views: Option<&[usize]>) -> CoreJointErrors {
+        let mut selected = self.inner.clone();
+        if let Some(views) = views {
+            selected.jacobians = views.iter().filter_map(|k| self.inner.jacobians.get(*k).cloned()).collect();
+        }
+        selected
+    }
+}
+
 /// Views of a problem, each as a pose with its information.
 #[pyclass(frozen, module = "handeye._core")]
 pub struct Compressed {
@@ -75,9 +137,7 @@ impl Compressed {
             Some(indices) => indices
                 .into_iter()
                 .map(|k| {
-                    self.views
-                        .get(k)
-                        .ok_or_else(|| invalid(py, &format!("view {k} of {}", self.views.len())))
+                    self.views.get(k).ok_or_else(|| invalid(py, &format!("view {k} of {}", self.views.len())))
                 })
                 .collect(),
         }
@@ -154,7 +214,7 @@ impl Compressed {
     /// The answer from these views, averaged over the hypotheses; see the type stub.
     #[pyo3(signature = (
         *, views=None, camera_prior=None, start=None, prior_sigma_m=1.0, exact_probability=1.0/3.0,
-        sides=None, levels=None, prior_degrees=20.0, floor_px2=1e-8, linearisations=5,
+        sides=None, levels=None, joints=None, prior_degrees=20.0, floor_px2=1e-8, linearisations=5,
     ))]
     #[expect(clippy::too_many_arguments, reason = "one keyword per assumption")]
     fn estimate<'py>(
@@ -167,10 +227,12 @@ impl Compressed {
         exact_probability: f64,
         sides: Option<Vec<String>>,
         levels: Option<(f64, f64)>,
+        joints: Option<&JointErrors>,
         prior_degrees: f64,
         floor_px2: f64,
         linearisations: usize,
     ) -> PyResult<Posterior> {
+        let joint_errors = joints.map(|j| j.select(views.as_deref()));
         let chosen = self.select(py, views)?;
         let camera_prior = match camera_prior {
             Some(prior) => square(py, "camera_prior", &prior)?,
@@ -182,16 +244,27 @@ impl Compressed {
                 names.iter().map(|name| crate::model::side(py, name)).collect::<PyResult<Vec<_>>>()?
             }
         };
-        let hypotheses = match levels {
-            None => LevelPrior { exact_probability, ..LevelPrior::default() }.grid_of(&sides),
-            Some((translation_m, rotation_rad)) => sides
-                .iter()
-                .map(|side| Hypothesis { side: Some(*side), translation_m, rotation_rad, log_prior: 0.0 })
-                .collect(),
+        let given_levels: Option<Vec<Hypothesis>> = levels.map(|(translation_m, rotation_rad)| {
+            sides.iter().map(|side| Hypothesis::twists(*side, translation_m, rotation_rad, 0.0)).collect()
+        });
+        if given_levels.is_some() && joints.is_some_and(|j| j.noise_rad.is_some()) {
+            return Err(invalid(
+                py,
+                "noise of the joints and levels of the robot's poses cannot both be given",
+            ));
+        }
+        let prior = LevelPrior { exact_probability, ..LevelPrior::default() };
+        let hypotheses = match joints {
+            Some(joints) => joints.hypotheses(&prior, &sides, given_levels),
+            None => given_levels.unwrap_or_else(|| prior.grid_of(&sides)),
         };
         let start = given(py, start)?;
-        let options =
-            EvidenceOptions { prior: weak_prior(prior_sigma_m), camera_prior, linearisations };
+        let options = EvidenceOptions {
+            prior: weak_prior(prior_sigma_m),
+            camera_prior,
+            joints: joint_errors,
+            linearisations,
+        };
         let (posterior, variances, origin) = py
             .detach(|| {
                 let variances = shrunk_variances(&chosen, prior_degrees, floor_px2);
@@ -200,8 +273,7 @@ impl Compressed {
                 let covariances: Vec<Matrix6<f64>> =
                     chosen.iter().zip(&variances).map(|(v, s)| v.covariance * *s + start_slack()).collect();
                 let chain = start_from_poses(&motions, &poses, &covariances, &options.prior, start)?;
-                let posterior =
-                    estimate(&chosen, &variances, &hypotheses, (chain.x, chain.y), &options)?;
+                let posterior = estimate(&chosen, &variances, &hypotheses, (chain.x, chain.y), &options)?;
                 Ok((posterior, variances, chain.origin))
             })
             .map_err(|e| to_python(py, e))?;
@@ -253,6 +325,21 @@ impl Posterior {
         self.inner.camera_delta.as_slice().to_vec()
     }
 
+    /// Offsets of the free joints, true minus read, radians or metres.
+    #[getter]
+    fn joint_offsets(&self) -> Vec<f64> {
+        self.inner.joint_offsets.as_slice().to_vec()
+    }
+
+    /// Levels of the joints' noise and of their offsets as `(noise_rad, offset_rad)`, in the order of `hypotheses`.
+    #[getter]
+    fn joint_levels(&self) -> Vec<(f64, f64)> {
+        self.by_weight()
+            .into_iter()
+            .map(|i| (self.hypotheses[i].joint_rad, self.hypotheses[i].offset_rad))
+            .collect()
+    }
+
     /// Covariance of all parameters.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f64>> {
@@ -283,7 +370,8 @@ impl Posterior {
         self.variances.clone()
     }
 
-    /// Hypotheses as `(side, translation_m, rotation_rad, probability)`, likeliest first; side "left", "right", "none".
+    /// Hypotheses as `(side, translation_m, rotation_rad, probability)`, likeliest first; side "left", "right",
+    /// "joints", "none".
     #[getter]
     fn hypotheses(&self) -> Vec<(&'static str, f64, f64, f64)> {
         self.by_weight()
@@ -291,6 +379,7 @@ impl Posterior {
             .map(|i| {
                 let h = &self.hypotheses[i];
                 let side = match h.side {
+                    None if h.joint_rad > 0.0 => "joints",
                     None => "none",
                     Some(Side::Left) => "left",
                     Some(Side::Right) => "right",

@@ -123,10 +123,10 @@ impl Model {
 }
 
 /// `(K, 6, q)` as one matrix per view.
-fn jacobian_list(py: Python<'_>, array: &Array<'_>) -> PyResult<Vec<DMatrix<f64>>> {
+pub fn jacobian_list(py: Python<'_>, array: &Array<'_>) -> PyResult<Vec<DMatrix<f64>>> {
     let shape = array.shape().to_vec();
     if shape.len() != 3 || shape[1] != 6 {
-        return Err(invalid(py, "kinematic_jacobians must have shape (N, 6, q)"));
+        return Err(invalid(py, "joint Jacobians must have shape (N, 6, q)"));
     }
     let values: Vec<f64> = array.as_array().iter().copied().collect();
     let size = 6 * shape[2];

@@ -11,8 +11,113 @@ pub struct Hypothesis {
     pub translation_m: f64,
     /// Standard deviation per axis, radians.
     pub rotation_rad: f64,
+    /// Standard deviation of the noise of the joints, radians; zero for none. Needs [`super::JointErrors`].
+    pub joint_rad: f64,
+    /// Standard deviation of the offsets of the joints, radians; meaningless without [`super::JointErrors`].
+    pub offset_rad: f64,
     /// Logarithm of its prior probability.
     pub log_prior: f64,
+}
+
+impl Hypothesis {
+    /// An exact robot.
+    pub fn exact(log_prior: f64) -> Self {
+        Self {
+            side: None,
+            translation_m: 0.0,
+            rotation_rad: 0.0,
+            joint_rad: 0.0,
+            offset_rad: EXACT_OFFSET_RAD,
+            log_prior,
+        }
+    }
+
+    /// Twists of these standard deviations on a side of the motion.
+    pub fn twists(side: Side, translation_m: f64, rotation_rad: f64, log_prior: f64) -> Self {
+        Self { side: Some(side), translation_m, rotation_rad, ..Self::exact(log_prior) }
+    }
+
+    /// Noise of the joints.
+    pub fn joints(joint_rad: f64, log_prior: f64) -> Self {
+        Self { joint_rad, ..Self::exact(log_prior) }
+    }
+
+    /// Whether the noise is the same, whatever the offsets.
+    pub(super) fn same_noise(&self, other: &Self) -> bool {
+        (self.side, self.translation_m, self.rotation_rad, self.joint_rad)
+            == (other.side, other.translation_m, other.rotation_rad, other.joint_rad)
+    }
+}
+
+/// Offsets so small that there are none, but that keep the information finite.
+pub const EXACT_OFFSET_RAD: f64 = 1e-7;
+
+/// Log-normal priors of the levels of joint errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointPrior {
+    /// Noise of the joints.
+    pub noise: LogNormal,
+    /// Offsets of the joints.
+    pub offset: LogNormal,
+    /// Prior probability that there are no offsets.
+    pub no_offset_probability: f64,
+}
+
+/// A log-normal prior on a grid of equal ratios.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogNormal {
+    /// Median.
+    pub median: f64,
+    /// Standard deviation of the logarithm.
+    pub spread: f64,
+    /// Smallest and largest value of the grid, and how many.
+    pub grid: (f64, f64, usize),
+}
+
+impl LogNormal {
+    /// Values with the logarithms of their probabilities, which sum to one.
+    fn values(&self) -> Vec<(f64, f64)> {
+        let (low, high, n) = self.grid;
+        let values = geometric(low, high, n);
+        let log = |value: f64| -0.5 * ((value / self.median).ln() / self.spread).powi(2);
+        let total: f64 = values.iter().map(|v| log(*v).exp()).sum();
+        values.into_iter().map(|v| (v, log(v) - total.ln())).collect()
+    }
+}
+
+impl Default for JointPrior {
+    fn default() -> Self {
+        let degrees = f64::to_radians;
+        Self {
+            noise: LogNormal {
+                median: degrees(0.01),
+                spread: 1.5,
+                grid: (degrees(2.5e-4), degrees(0.25), 13),
+            },
+            offset: LogNormal { median: degrees(0.03), spread: 1.2, grid: (degrees(2e-3), degrees(0.5), 7) },
+            no_offset_probability: 0.25,
+        }
+    }
+}
+
+impl JointPrior {
+    /// Every hypothesis about the noise with every level of the offsets; one noise after another.
+    pub fn with_offsets(&self, noise: &[Hypothesis]) -> Vec<Hypothesis> {
+        let mut offsets = vec![(EXACT_OFFSET_RAD, self.no_offset_probability.ln())];
+        let share = (1.0 - self.no_offset_probability).ln();
+        offsets.extend(self.offset.values().into_iter().map(|(value, log)| (value, log + share)));
+        offsets.retain(|(_, log)| log.is_finite());
+        noise
+            .iter()
+            .flat_map(|h| {
+                offsets.iter().map(|(offset_rad, log)| Hypothesis {
+                    offset_rad: *offset_rad,
+                    log_prior: h.log_prior + log,
+                    ..*h
+                })
+            })
+            .collect()
+    }
 }
 
 /// Log-normal prior of the levels: of the rotation, and of the length by which it turns into translation.
@@ -65,6 +170,11 @@ impl LevelPrior {
 
     /// The grid over the given sides, equally likely; probabilities sum to one.
     pub fn grid_of(&self, sides: &[Side]) -> Vec<Hypothesis> {
+        self.grid_with(sides, None)
+    }
+
+    /// As [`LevelPrior::grid_of`]; noise of the joints, where known how it acts, is as likely as either side.
+    pub fn grid_with(&self, sides: &[Side], joints: Option<&LogNormal>) -> Vec<Hypothesis> {
         let mut levels = Vec::new();
         let (low, high, n) = self.rotation_grid;
         for rotation in geometric(low, high, n) {
@@ -78,21 +188,19 @@ impl LevelPrior {
         let total: f64 = levels.iter().map(|l| l.2.exp()).sum();
         let mut grid = Vec::with_capacity(1 + levels.len() * sides.len());
         if self.exact_probability > 0.0 {
-            grid.push(Hypothesis {
-                side: None,
-                translation_m: 0.0,
-                rotation_rad: 0.0,
-                log_prior: self.exact_probability.ln(),
-            });
+            grid.push(Hypothesis::exact(self.exact_probability.ln()));
         }
-        let share = ((1.0 - self.exact_probability) / sides.len() as f64).ln() - total.ln();
+        let kinds = sides.len() + usize::from(joints.is_some());
+        let each = ((1.0 - self.exact_probability) / kinds as f64).ln();
+        let share = each - total.ln();
         for side in sides {
-            grid.extend(levels.iter().map(|(rotation, lever, log_prior)| Hypothesis {
-                side: Some(*side),
-                translation_m: rotation * lever,
-                rotation_rad: *rotation,
-                log_prior: log_prior + share,
+            grid.extend(levels.iter().map(|(rotation, lever, log_prior)| {
+                Hypothesis::twists(*side, rotation * lever, *rotation, log_prior + share)
             }));
+        }
+        if let Some(joints) = joints {
+            let values = joints.values();
+            grid.extend(values.into_iter().map(|(rad, log)| Hypothesis::joints(rad, log + each)));
         }
         grid
     }
@@ -108,5 +216,23 @@ mod tests {
         let total: f64 = grid.iter().map(|h| h.log_prior.exp()).sum();
         assert!((total - 1.0).abs() < 1e-12);
         assert_eq!(grid.len(), 1 + 2 * 72);
+    }
+
+    #[test]
+    fn probabilities_with_joints_sum_to_one() {
+        let prior = JointPrior::default();
+        let noise = LevelPrior::default().grid_with(&[Side::Left, Side::Right], Some(&prior.noise));
+        let by_kind = |wanted: fn(&Hypothesis) -> bool| -> f64 {
+            noise.iter().filter(|h| wanted(h)).map(|h| h.log_prior.exp()).sum()
+        };
+        assert!((by_kind(|h| h.joint_rad > 0.0) - 2.0 / 9.0).abs() < 1e-12);
+        assert!((by_kind(|h| h.side == Some(Side::Right)) - 2.0 / 9.0).abs() < 1e-12);
+        let grid = prior.with_offsets(&noise);
+        assert_eq!(grid.len(), (1 + 2 * 72 + 13) * 8);
+        let total: f64 = grid.iter().map(|h| h.log_prior.exp()).sum();
+        assert!((total - 1.0).abs() < 1e-12);
+        let exact: f64 =
+            grid.iter().filter(|h| h.offset_rad == EXACT_OFFSET_RAD).map(|h| h.log_prior.exp()).sum();
+        assert!((exact - 0.25).abs() < 1e-12);
     }
 }

@@ -8,11 +8,13 @@
 mod chain;
 mod compressed;
 mod hypotheses;
+mod joints;
 mod posterior;
 
 pub use chain::{ChainStart, WeakPrior, start_from_poses};
 pub use compressed::{CompressedView, compress, shrunk_variances};
-pub use hypotheses::{Hypothesis, LevelPrior};
+pub use hypotheses::{EXACT_OFFSET_RAD, Hypothesis, JointPrior, LevelPrior, LogNormal};
+pub use joints::JointErrors;
 pub use posterior::{EvidenceOptions, Posterior, estimate};
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Every hypothesis weighed by its restricted likelihood, and the answer averaged over them.
 //!
 //! With the chain linearised, the twist `e_k` between chain and pose of view k is Gaussian: mean
-//! `-[I, Ad(X A_k), D_k] theta`, covariance `sigma_k^2 M_k^-1 + S_k`. Integrating `theta` out (flat but for the
-//! priors) leaves the restricted likelihood of the levels,
+//! `-[I, Ad(X A_k), C_k, Ad(X) D_k] theta` (chain, camera, joint offsets), covariance `sigma_k^2 M_k^-1 + S_k`.
+//! Integrating `theta` out (flat but for the priors) leaves the restricted likelihood of the levels,
 //! `-2 ln p = sum ln |Sigma_k| + e' Sigma^-1 e - theta' r + ln |Lambda|` (Patterson and Thompson 1971).
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use super::chain::WeakPrior;
 use super::compressed::CompressedView;
 use super::hypotheses::Hypothesis;
+use super::joints::JointErrors;
 use crate::error::Error;
 use crate::least_squares::Side;
 use crate::se3::Se3;
@@ -21,6 +22,8 @@ pub struct EvidenceOptions {
     pub prior: WeakPrior,
     /// Information of the camera parameters around their calibrated values, `n_c x n_c`.
     pub camera_prior: DMatrix<f64>,
+    /// How errors of the joints move the motions, where the arm's kinematics are known.
+    pub joints: Option<JointErrors>,
     /// Most re-linearisations.
     pub linearisations: usize,
 }
@@ -34,9 +37,11 @@ pub struct Posterior {
     pub y: Se3,
     /// Camera parameters relative to their calibrated values, averaged.
     pub camera_delta: DVector<f64>,
+    /// Offsets of the free joints, true minus read, radians or metres, averaged.
+    pub joint_offsets: DVector<f64>,
     /// Probability of each hypothesis.
     pub weights: Vec<f64>,
-    /// Information of `[xi_x, xi_y, c]` under each hypothesis.
+    /// Information of `[xi_x, xi_y, c, joint offsets]` under each hypothesis.
     pub informations: Vec<DMatrix<f64>>,
     /// Covariance of the parameters: mean of the hypotheses' and the spread between their answers.
     pub covariance: DMatrix<f64>,
@@ -59,11 +64,19 @@ struct Linear {
 
 /// Views linearised at `X` and `Y`, whitening left open.
 struct View {
-    /// `[I, Ad(X A), D, e]`.
+    /// `[I, Ad(X A), camera, joint offsets, e]`.
     rows: DMatrix<f64>,
     pixel_covariance: Matrix6<f64>,
     left: Matrix6<f64>,
     right: Matrix6<f64>,
+    /// Covariance in the camera frame of joints that are noisy by one radian.
+    joints: Option<Matrix6<f64>>,
+}
+
+/// The whitened views summed up under one noise, whatever the offsets.
+struct Sums {
+    products: DMatrix<f64>,
+    log_determinant: f64,
 }
 
 /// Estimates `X`, `Y` and the camera from compressed views with pixel variances, averaged over the hypotheses.
@@ -78,11 +91,19 @@ pub fn estimate(
     options: &EvidenceOptions,
 ) -> Result<Posterior, Error> {
     let n_c = options.camera_prior.nrows();
+    let n_q = options.joints.as_ref().map_or(0, JointErrors::offset_count);
     if views.len() != variances_px2.len() || views.is_empty() || hypotheses.is_empty() {
         return Err(Error::invalid("views and pixel variances must be as many, and hypotheses at least one"));
     }
     if views.iter().any(|v| v.sensitivity.ncols() != n_c) {
         return Err(Error::invalid(format!("views compressed with other than {n_c} camera parameters")));
+    }
+    match &options.joints {
+        Some(joints) => joints.check(views.len())?,
+        None if hypotheses.iter().any(|h| h.joint_rad > 0.0) => {
+            return Err(Error::invalid("noise of the joints needs the arm's Jacobians"));
+        }
+        None => {}
     }
     let (mut x, mut y) = start;
     let mut focus: Option<Vec<usize>> = None;
@@ -92,12 +113,18 @@ pub fn estimate(
         let last = round == options.linearisations;
         let all: Vec<usize> = (0..hypotheses.len()).collect();
         let chosen = if last { all } else { focus.clone().unwrap_or(all) };
-        let prepared = prepare(views, variances_px2, &x, &y);
+        let prepared = prepare(views, variances_px2, &x, &y, options.joints.as_ref());
         let camera = camera_terms(views, variances_px2, &options.camera_prior);
+        // Hypotheses that differ only in the offsets stand side by side and share the sums over views.
+        let mut sums: Option<(usize, Option<Sums>)> = None;
         let evaluated: Vec<(usize, Linear, f64)> = chosen
             .iter()
             .filter_map(|i| {
-                let linear = linearise(&prepared, &hypotheses[*i], &x, options, &camera)?;
+                if !sums.as_ref().is_some_and(|(j, _)| hypotheses[*j].same_noise(&hypotheses[*i])) {
+                    sums = Some((*i, sum_up(&prepared, &hypotheses[*i])));
+                }
+                let sums = sums.as_ref()?.1.as_ref()?;
+                let linear = linearise(sums, &hypotheses[*i], &x, options, &camera)?;
                 let log = hypotheses[*i].log_prior - 0.5 * linear.minus_two_log_likelihood;
                 log.is_finite().then_some((*i, linear, log))
             })
@@ -107,7 +134,7 @@ pub fn estimate(
             return Err(Error::numerical("no noise level explains these views"));
         }
         let total: f64 = evaluated.iter().map(|e| (e.2 - best).exp()).sum();
-        let mut mean = DVector::zeros(12 + n_c);
+        let mut mean = DVector::zeros(12 + n_c + n_q);
         for (_, linear, log) in &evaluated {
             mean += &linear.theta * ((log - best).exp() / total);
         }
@@ -127,7 +154,12 @@ pub fn estimate(
         }
     }
     let (evaluated, mean, best, total) = outcome.ok_or_else(|| Error::numerical("no linearisation"))?;
-    finish(hypotheses.len(), &evaluated, &mean, best, total, x, y)
+    let posterior = finish(hypotheses.len(), &evaluated, &mean, best, total, x, y)?;
+    Ok(Posterior {
+        camera_delta: mean.rows(12, n_c).into_owned(),
+        joint_offsets: mean.rows(12 + n_c, n_q).into_owned(),
+        ..posterior
+    })
 }
 
 fn finish(
@@ -167,7 +199,8 @@ fn finish(
     Ok(Posterior {
         x: Se3::exp(&Vector6::from_column_slice(&mean.as_slice()[0..6])) * x,
         y: Se3::exp(&Vector6::from_column_slice(&mean.as_slice()[6..12])) * y,
-        camera_delta: mean.rows(12, n - 12).into_owned(),
+        camera_delta: DVector::zeros(0),
+        joint_offsets: DVector::zeros(0),
         weights,
         informations,
         covariance,
@@ -177,21 +210,39 @@ fn finish(
     })
 }
 
-fn prepare(views: &[&CompressedView], variances: &[f64], x: &Se3, y: &Se3) -> Vec<View> {
+fn prepare(
+    views: &[&CompressedView],
+    variances: &[f64],
+    x: &Se3,
+    y: &Se3,
+    joints: Option<&JointErrors>,
+) -> Vec<View> {
+    let n_q = joints.map_or(0, JointErrors::offset_count);
     views
         .iter()
         .zip(variances)
-        .map(|(view, variance)| {
+        .enumerate()
+        .map(|(k, (view, variance))| {
             let forward = *x * view.motion;
             let error = (forward * *y * view.pose.inverse()).log();
             let to_y = forward.adjoint();
             let n_c = view.sensitivity.ncols();
-            let mut rows = DMatrix::zeros(6, 13 + n_c);
+            let mut rows = DMatrix::zeros(6, 13 + n_c + n_q);
             rows.view_mut((0, 0), (6, 6)).fill_with_identity();
             rows.view_mut((0, 6), (6, 6)).copy_from(&to_y);
             rows.view_mut((0, 12), (6, n_c)).copy_from(&view.sensitivity);
-            rows.set_column(12 + n_c, &error);
-            View { rows, pixel_covariance: view.covariance * *variance, left: x.adjoint(), right: to_y }
+            rows.set_column(12 + n_c + n_q, &error);
+            let left = x.adjoint();
+            if let Some(joints) = joints {
+                rows.view_mut((0, 12 + n_c), (6, n_q)).copy_from(&(left * joints.offset_columns(k)));
+            }
+            View {
+                rows,
+                pixel_covariance: view.covariance * *variance,
+                left,
+                right: to_y,
+                joints: joints.map(|j| left * j.unit_covariance(k) * left.transpose()),
+            }
         })
         .collect()
 }
@@ -213,6 +264,9 @@ fn camera_terms(
 
 /// Covariance of the robot's error of a hypothesis in the camera frame.
 fn robot_covariance(view: &View, hypothesis: &Hypothesis) -> Option<Matrix6<f64>> {
+    if hypothesis.joint_rad > 0.0 {
+        return Some(view.joints? * hypothesis.joint_rad.powi(2));
+    }
     let map = match hypothesis.side? {
         Side::Left => &view.left,
         Side::Right => &view.right,
@@ -225,14 +279,8 @@ fn robot_covariance(view: &View, hypothesis: &Hypothesis) -> Option<Matrix6<f64>
     Some(root * root.transpose())
 }
 
-fn linearise(
-    views: &[View],
-    hypothesis: &Hypothesis,
-    x: &Se3,
-    options: &EvidenceOptions,
-    camera: &(DMatrix<f64>, DVector<f64>),
-) -> Option<Linear> {
-    let n = 12 + camera.1.len();
+fn sum_up(views: &[View], hypothesis: &Hypothesis) -> Option<Sums> {
+    let n = views.first()?.rows.ncols() - 1;
     let mut sums = DMatrix::zeros(n + 1, n + 1);
     let mut log_determinant = 0.0;
     let mut whitened = DMatrix::zeros(6, n + 1);
@@ -256,20 +304,43 @@ fn linearise(
         }
         sums.gemm_tr(1.0, &whitened, &whitened, 1.0);
     }
-    let mut information = sums.view((0, 0), (n, n)).into_owned();
-    let mut right = -sums.view((0, n), (n, 1)).into_owned().column(0).into_owned();
+    Some(Sums { products: sums, log_determinant })
+}
+
+fn linearise(
+    sums: &Sums,
+    hypothesis: &Hypothesis,
+    x: &Se3,
+    options: &EvidenceOptions,
+    camera: &(DMatrix<f64>, DVector<f64>),
+) -> Option<Linear> {
+    let n_c = camera.1.len();
+    let n = sums.products.ncols() - 1;
+    let mut information = sums.products.view((0, 0), (n, n)).into_owned();
+    let mut right = -sums.products.view((0, n), (n, 1)).into_owned().column(0).into_owned();
     let (weak, pull) = options.prior.normal(x);
     let mut block = information.view_mut((0, 0), (12, 12));
     block += &weak;
     let mut rows = right.rows_mut(0, 12);
     rows += &pull;
-    let mut block = information.view_mut((12, 12), (n - 12, n - 12));
+    let mut block = information.view_mut((12, 12), (n_c, n_c));
     block += &camera.0;
-    let mut rows = right.rows_mut(12, n - 12);
+    let mut rows = right.rows_mut(12, n_c);
     rows += &camera.1;
+    let log_prior_determinant = options.joints.as_ref().map_or(0.0, |joints| {
+        let mut sum = 0.0;
+        for (i, joint) in joints.free.iter().enumerate() {
+            let sigma = hypothesis.offset_rad * joints.scales[*joint];
+            information[(12 + n_c + i, 12 + n_c + i)] += sigma.powi(-2);
+            // The prior's normalisation depends on the level.
+            sum += 2.0 * sigma.ln();
+        }
+        sum
+    });
     let (theta, information_log_determinant) = solve_scaled(&information, &right)?;
     let minus_two_log_likelihood =
-        log_determinant + sums[(n, n)] - theta.dot(&right) + information_log_determinant;
+        sums.log_determinant + sums.products[(n, n)] - theta.dot(&right) + information_log_determinant;
+    let minus_two_log_likelihood = minus_two_log_likelihood + log_prior_determinant;
     Some(Linear { information, theta, minus_two_log_likelihood })
 }
 

@@ -23,6 +23,10 @@ fn compressed(cell: &Cell, reported: &[Se3], sigma_px: f64, seed: u64) -> Vec<Co
 }
 
 fn run(views: &[CompressedView]) -> Posterior {
+    run_with(views, None, &LevelPrior::default().grid())
+}
+
+fn run_with(views: &[CompressedView], joints: Option<JointErrors>, hypotheses: &[Hypothesis]) -> Posterior {
     let views: Vec<&CompressedView> = views.iter().collect();
     let variances = shrunk_variances(&views, 20.0, 1e-12);
     let motions: Vec<Se3> = views.iter().map(|v| v.motion).collect();
@@ -36,9 +40,10 @@ fn run(views: &[CompressedView]) -> Posterior {
     let options = EvidenceOptions {
         prior: WeakPrior::default(),
         camera_prior: DMatrix::zeros(0, 0),
+        joints,
         linearisations: 4,
     };
-    estimate(&views, &variances, &LevelPrior::default().grid(), (start.x, start.y), &options).unwrap()
+    estimate(&views, &variances, hypotheses, (start.x, start.y), &options).unwrap()
 }
 
 fn noisy(cell: &Cell, noise: Option<&RobotNoise>, seed: u64) -> Vec<Se3> {
@@ -108,4 +113,90 @@ fn regions_hold_the_truth() {
         }
         assert!((0.8..1.2).contains(&nees), "{:?}: {nees}", noise.map(|n| n.side));
     }
+}
+
+/// An arm made up: any Jacobians will do, as long as they differ from view to view.
+fn arm(seed: u64, views: usize) -> JointErrors {
+    let mut random = Random::new(seed);
+    JointErrors {
+        jacobians: (0..views).map(|_| DMatrix::from_fn(6, 5, |_, _| random.uniform(-0.7, 0.7))).collect(),
+        scales: vec![1.0, 1.0, 0.5, 1.0, 1.0],
+        free: vec![1, 2, 3],
+    }
+}
+
+/// What the arm reports where joints are off by `noise` per view and by `offsets` (of the free joints) in all.
+fn misread(cell: &Cell, arm: &JointErrors, noise: f64, offsets: &[f64], seed: u64) -> Vec<Se3> {
+    let mut random = Random::new(seed);
+    let motions = cell.motions.iter().zip(&arm.jacobians);
+    motions
+        .map(|(a, d)| {
+            let mut dq = nalgebra::DVector::from_fn(5, |i, _| random.normal() * noise * arm.scales[i]);
+            for (joint, offset) in arm.free.iter().zip(offsets) {
+                dq[*joint] += offset;
+            }
+            // The motion is exp(D dq) A where A is reported.
+            Se3::exp(&Vector6::from_column_slice((d * dq).as_slice())).inverse() * *a
+        })
+        .collect()
+}
+
+fn joint_grid() -> Vec<Hypothesis> {
+    let prior = JointPrior::default();
+    let noise = LevelPrior::default().grid_with(&[Side::Left, Side::Right], Some(&prior.noise));
+    prior.with_offsets(&noise)
+}
+
+#[test]
+fn noise_and_offsets_of_joints_are_found_and_regions_hold_the_truth() {
+    let hypotheses = joint_grid();
+    for (noise, offset) in [(4e-4, 0.0), (0.0, 1e-3), (3e-4, 1e-3)] {
+        let trials = 40;
+        let (mut nees, mut of_joints, mut gain) = (0.0, 0.0, 0.0);
+        for seed in 0..trials {
+            let cell = Cell::new(2000 + seed, 9);
+            let arm = arm(seed, 9);
+            let mut random = Random::new(seed + 77);
+            let offsets: Vec<f64> =
+                arm.free.iter().map(|j| random.normal() * offset * arm.scales[*j]).collect();
+            let views = compressed(&cell, &misread(&cell, &arm, noise, &offsets, seed), 0.1, seed);
+            let posterior = run_with(&views, Some(arm.clone()), &hypotheses);
+            let error = (posterior.x * cell.x.inverse()).log();
+            let block = posterior.covariance.fixed_view::<6, 6>(0, 0).into_owned();
+            nees += error.dot(&block.cholesky().unwrap().solve(&error)) / (6 * trials) as f64;
+            let weights = hypotheses.iter().zip(&posterior.weights);
+            of_joints += weights.filter(|(h, _)| h.joint_rad > 0.0).map(|(_, w)| w).sum::<f64>();
+            let blind = run(&views);
+            let without = (blind.x * cell.x.inverse()).log();
+            gain += (without.norm() / error.norm()).ln() / trials as f64;
+            if noise == 0.0 {
+                for (found, truth) in posterior.joint_offsets.iter().zip(&offsets) {
+                    assert!((found - truth).abs() < 2e-4, "{found} {truth}");
+                }
+            }
+        }
+        of_joints /= trials as f64;
+        assert!((0.75..1.25).contains(&nees), "{noise} {offset}: {nees}");
+        assert_eq!(of_joints > 0.9, noise > 0.0, "{noise} {offset}: {of_joints}");
+        // Twists of the right size say nearly as much as joints; offsets that are known are worth far more.
+        assert!(gain.exp() > if noise == 0.0 { 4.0 } else { 0.95 }, "{noise} {offset}: {}", gain.exp());
+    }
+}
+
+#[test]
+fn joint_errors_that_do_not_fit_are_refused() {
+    let cell = Cell::new(1, 4);
+    let views = compressed(&cell, &cell.motions, 0.1, 1);
+    let views: Vec<&CompressedView> = views.iter().collect();
+    let try_with = |joints: Option<JointErrors>| {
+        let camera_prior = DMatrix::zeros(0, 0);
+        let options =
+            EvidenceOptions { prior: WeakPrior::default(), camera_prior, joints, linearisations: 2 };
+        estimate(&views, &[0.01; 4], &joint_grid(), (cell.x, cell.y), &options)
+    };
+    assert!(try_with(Some(arm(1, 4))).is_ok());
+    assert!(try_with(None).unwrap_err().to_string().contains("Jacobians"));
+    assert!(try_with(Some(arm(1, 3))).is_err());
+    assert!(try_with(Some(JointErrors { free: vec![5], ..arm(1, 4) })).is_err());
+    assert!(try_with(Some(JointErrors { scales: vec![0.0; 5], ..arm(1, 4) })).is_err());
 }
