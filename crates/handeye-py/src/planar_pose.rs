@@ -5,9 +5,9 @@ use handeye_core::pose::PoseFit;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
+use crate::camera::{camera, features};
 use crate::convert::{self, Array};
 use crate::errors::to_python;
-use crate::camera::{camera, features};
 
 /// Registers the functions of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

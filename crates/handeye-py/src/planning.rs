@@ -20,8 +20,7 @@ fn objective(py: Python<'_>, name: &str, tool_points: Option<Array<'_>>) -> PyRe
         "entropy" => Ok(Objective::Entropy),
         "entropy_handeye" => Ok(Objective::EntropyHandEye),
         "tool_point" => {
-            let points =
-                tool_points.ok_or_else(|| invalid(py, "objective tool_point needs tool_points"))?;
+            let points = tool_points.ok_or_else(|| invalid(py, "objective tool_point needs tool_points"))?;
             let points = convert::vectors::<3>(py, "tool_points", &points)?;
             Objective::tool_points(&points).map_err(|e| to_python(py, e))
         }
