@@ -4,7 +4,7 @@ import sys
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from cyclopts import Parameter
 
@@ -53,8 +53,8 @@ class Names:
     target_frame: str | None = None
     """The target, for formats that name it; calibration_target if not given."""
     link_optical: tuple[float, float, float, float, float, float, float] | None = None
-    """Pose of the optical frame in the camera link as the driver has it: x y z (metres) qx qy qz qw. Without it
-    the link has the same origin and axes by ROS REP 103."""
+    """Pose of the optical frame in the camera link, as the driver has it: x y z (metres) qx qy qz qw. Without
+    it the link has the same origin and axes by ROS REP 103."""
 
     def frames(self, usual: Frames) -> Frames:
         """Return the frames with these names.
@@ -88,7 +88,7 @@ def export(
     output: Path | None = None,
     model: ModelName | None = None,
     reduced: bool = False,
-    names: Names = Names(),  # noqa: B008 - frozen
+    names: Names = Names(),
     source: Source = Source(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
@@ -102,10 +102,10 @@ def export(
     result
         JSON that solve wrote or printed, or a folder with views, which is solved first.
     format
-        ros2: command for static_transform_publisher. urdf: fixed joint. ros1: line for a launch file. moveit2,
-        moveit: launch file as MoveIt Calibration writes it, ROS 2 and ROS 1. easy_handeye2: .calib file.
-        opencv: FileStorage YAML. json: frames and units spelled out. moveit_samples: poses of robot and target
-        of every view, from a folder only.
+        ros2: command for static_transform_publisher. urdf: fixed joint. ros1: line for a launch file.
+        moveit2, moveit: launch file as MoveIt Calibration writes it, ROS 2 and ROS 1. easy_handeye2: .calib
+        file. opencv: FileStorage YAML. json: frames and units spelled out. moveit_samples: poses of robot and
+        target of every view, from a folder only.
     output
         Write to this file instead of printing.
     model
@@ -114,7 +114,7 @@ def export(
         For a folder: answer even where the views leave directions open.
     """
     check_output(output)
-    is_folder = not result.is_file() or result.suffix.lower() != ".json"
+    is_folder = result.is_dir() or result.suffix.lower() != ".json"
     if format is Format.MOVEIT_SAMPLES:
         if not is_folder:
             raise UsageError(f"{format.value} needs the views", hint="give the folder instead of the result")

@@ -1,0 +1,181 @@
+"""What a calibration found, as far as others need it: from a solve, or from the JSON that a solve wrote."""
+
+import json
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import msgspec
+import numpy as np
+
+from handeye.datasets.reading import MIB, located, read_text
+from handeye.errors import InputError
+from handeye.types import Camera, Mounting, Pose
+from handeye.types.arrays import FloatArray, finite_array
+from handeye.types.calibration import Calibration
+from handeye.types.plain import read_document
+
+MAX_BYTES = 16 * MIB
+
+_Rows = list[list[float]]
+
+
+class _Views(msgspec.Struct):
+    used: list[str] = []
+
+
+class _Unobservable(msgspec.Struct):
+    sentence: str
+
+
+class _ResultDocument(msgspec.Struct):
+    """What is needed of the JSON of a solve; it has more."""
+
+    mounting: Mounting
+    covariance: _Rows
+    T_flange_camera: _Rows | None = None
+    T_base_camera: _Rows | None = None
+    T_base_target: _Rows | None = None
+    T_flange_target: _Rows | None = None
+    recording: str = ""
+    views: _Views = msgspec.field(default_factory=_Views)
+    warnings: list[str] = []
+    unobservable: list[_Unobservable] = []
+    camera: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """The answer of a calibration.
+
+    Parameters
+    ----------
+    mounting
+        Where the camera sits.
+    T_parent_camera
+        Pose of the camera in the frame that it is fixed to: `T_flange_camera` or `T_base_camera`.
+    T_fixed_target
+        Pose of the target in the frame that it is fixed to: `T_base_target` or `T_flange_target`.
+    covariance
+        (6, 6) covariance of the camera's pose: of a twist in the camera frame, metres and radians.
+    camera
+        The camera, None if it was not kept.
+    recording
+        Name of the recording.
+    view_count
+        Number of views that the answer rests on.
+    warnings
+        What to know before it is used.
+    """
+
+    mounting: Mounting
+    T_parent_camera: Pose
+    T_fixed_target: Pose
+    covariance: FloatArray
+    camera: Camera | None = None
+    recording: str = ""
+    view_count: int = 0
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, calibration: Calibration, recording: str, warnings: Iterable[str] = ()) -> "Result":
+        """Return the answer of a calibration, with warnings about the recording before its own."""
+        camera_pose, target_pose = calibration.results.values()
+        return cls(
+            calibration.mounting,
+            camera_pose,
+            target_pose,
+            calibration.covariance,
+            calibration.camera,
+            recording,
+            len(calibration.used),
+            _once(
+                [
+                    *(direction.sentence for direction in calibration.unobservable),
+                    *warnings,
+                    *calibration.warnings,
+                ]
+            ),
+        )
+
+    @property
+    def sigma_translation_m(self) -> float:
+        """Standard deviation of the camera's position: root of the sum of the three variances."""
+        return float(np.sqrt(np.trace(self.covariance[:3, :3])))
+
+    @property
+    def sigma_rotation_rad(self) -> float:
+        """Standard deviation of the camera's rotation: root of the sum of the three variances."""
+        return float(np.sqrt(np.trace(self.covariance[3:, 3:])))
+
+
+def read_result(path: str | os.PathLike[str]) -> Result:
+    """Read the JSON object that a solve printed or wrote.
+
+    Raises
+    ------
+    InputError
+        Not such a file; the message names file and field.
+    """
+    file = Path(path)
+    document = read_document(read_result_json(file), _ResultDocument, str(file))
+    camera_name, target_name = document.mounting.result_names
+    with located(str(file)):
+        poses: list[Pose] = []
+        for name in (camera_name, target_name):
+            rows = cast("_Rows | None", getattr(document, name))
+            if rows is None:
+                raise InputError(
+                    f"{name} is missing, though mounting is {document.mounting.value}", code="invalid_field"
+                )
+            with located(name):
+                poses.append(Pose(rows))
+        return Result(
+            document.mounting,
+            *poses,
+            covariance=_covariance(document.covariance),
+            camera=None if document.camera is None else Camera.from_dict(document.camera),
+            recording=document.recording,
+            view_count=len(document.views.used),
+            warnings=_once([*(found.sentence for found in document.unobservable), *document.warnings]),
+        )
+
+
+def read_result_json(file: Path) -> dict[str, Any]:
+    """Return the JSON object in a file that a solve wrote.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, is no JSON object, or says that the solve failed.
+    """
+    text = read_text(file, MAX_BYTES)
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{file}: not JSON: {error}", code="not_json") from error
+    if not isinstance(data, dict):
+        raise InputError(f"{file}: expected the JSON object that a solve writes", code="invalid_field")
+    table = cast("dict[str, Any]", data)
+    if "error" in table and "mounting" not in table:
+        raise InputError(
+            f"{file}: no result but an error",
+            code="no_result",
+            hint="look at the message in it and solve again",
+        )
+    return table
+
+
+def _covariance(rows: _Rows) -> FloatArray:
+    covariance = finite_array(rows, (6, 6), "covariance")
+    scale = np.sqrt(np.abs(np.outer(np.diag(covariance), np.diag(covariance))))
+    symmetric = bool(np.all(np.abs(covariance - covariance.T) <= 1e-6 * scale))
+    if not symmetric or bool(np.any(np.diag(covariance) < 0)):
+        raise InputError("covariance: not symmetric, or a variance below zero", code="invalid_field")
+    return covariance
+
+
+def _once(sentences: list[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(sentences))
