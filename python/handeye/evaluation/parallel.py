@@ -1,0 +1,74 @@
+"""Many independent pieces of work on several processes, with the same results however many there are."""
+
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
+from typing import Any, TypeVar
+
+from joblib import Parallel, delayed, parallel_config  # pyright: ignore[reportUnknownVariableType]
+
+from handeye.errors import InputError
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+Progress = Callable[[int, int], None]
+"""Is told how many pieces are done, of how many."""
+
+
+def run_all(
+    work: Callable[[T], R], pieces: Sequence[T], *, workers: int = 1, progress: Progress | None = None
+) -> list[R]:
+    """Return the results of all pieces, in their order.
+
+    Each piece must carry its own seed: then the results are the same to the last bit whatever the number of
+    processes. Ctrl-C ends the processes too.
+
+    Parameters
+    ----------
+    work
+        A function of a module, so that another process finds it.
+    pieces
+        What to call it with; enough pieces of equal size keep all processes busy.
+    workers
+        Number of processes; 1 works in this one.
+    progress
+        Told how many pieces are done, of how many; first with none done.
+
+    Raises
+    ------
+    InputError
+        Fewer than one process.
+    """
+    if workers < 1:
+        raise InputError(f"{workers} workers, expected at least 1", code="out_of_range")
+    if workers == 1 or len(pieces) < 2:
+        return _gather((work(piece) for piece in pieces), len(pieces), progress)
+    # Threads inside the processes would only compete.
+    with parallel_config(backend="loky", inner_max_num_threads=1):
+        # One piece at a time: the slowest process holds up the others by one piece at most.
+        one: Any = 1
+        pool: Any = Parallel(n_jobs=min(workers, len(pieces)), batch_size=one, return_as="generator")
+        results: Generator[R] = pool(delayed(work)(piece) for piece in pieces)
+        with closing(results):  # left early, by an error or Ctrl-C, it ends its processes
+            return _gather(results, len(pieces), progress)
+
+
+def _gather(results: Iterable[R], total: int, progress: Progress | None) -> list[R]:
+    told = progress or _nothing
+    gathered: list[R] = []
+    told(0, total)
+    for result in results:
+        gathered.append(result)
+        told(len(gathered), total)
+    return gathered
+
+
+def _nothing(done: int, total: int) -> None:
+    """Be the progress of whoever wants none."""
+
+
+def part_of(progress: Progress | None, before: int, total: int) -> Progress | None:
+    """Return the progress of a part of a larger work, of which `before` pieces come first."""
+    if progress is None:
+        return None
+    return lambda done, _: progress(before + done, total)

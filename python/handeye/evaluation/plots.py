@@ -1,0 +1,138 @@
+"""The pictures of the studies, drawn without a display."""
+# matplotlib is typed only in part.
+# pyright: reportUnknownMemberType=false, reportUnknownLambdaType=false, reportUnknownArgumentType=false
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+
+from handeye.evaluation.comparison import POLICIES, SetResult
+from handeye.evaluation.studies.curves import Curves, correlations, scatters
+
+# Colours that colour-blind readers tell apart (Okabe and Ito), and marks for print without colour.
+_STYLES = {
+    "next_best_view": ("next best view", "#0072B2", "o"),
+    "random": ("random", "#E69F00", "s"),
+    "max_distance": ("max distance", "#009E73", "^"),
+}
+_PANELS = (
+    ("entropy_nats", "entropy (nats)", False),
+    ("rmse_px", "held-out RMSE (px)", True),
+    ("relative_translation_mm", "relative translation error (mm)", True),
+    ("relative_rotation_deg", "relative rotation error (deg)", True),
+)
+_TRUTH_PANELS = (
+    ("translation_mm", "translation error against truth (mm)", True),
+    ("rotation_deg", "rotation error against truth (deg)", True),
+)
+
+
+def curves_figure(curves: Curves, result: SetResult) -> Figure:
+    """Draw the curves of one set: mean over the trials of each policy, and the band of its quartiles."""
+    has_truth = not np.isnan(result.final(POLICIES[0], "translation_mm")).all()
+    panels = _PANELS + (_TRUTH_PANELS if has_truth else ())
+    rows = -(-len(panels) // 2)
+    figure = Figure(figsize=(9, 3.1 * rows + 0.7), layout="constrained", dpi=150)
+    axes = [figure.add_subplot(rows, 2, i + 1) for i in range(len(panels))]
+    for axis, (metric, label, logarithmic) in zip(axes, panels, strict=True):
+        for policy in POLICIES:
+            _curve(axis, curves, result, policy, metric)
+        axis.set_ylabel(label)
+        axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+        if logarithmic:
+            _logarithmic(axis)
+        axis.grid(visible=True, which="both", alpha=0.25, linewidth=0.6)
+    for axis in axes[-2:]:
+        axis.set_xlabel(f"views added to {curves.protocol.start_views}")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(POLICIES), frameon=False)
+    figure.suptitle(
+        f"{result.name}, model {curves.model}: mean and quartiles of {len(result.trials)} random starts",
+        fontsize="medium",
+    )
+    return figure
+
+
+def _curve(axis: Axes, curves: Curves, result: SetResult, policy: str, metric: str) -> None:
+    name, colour, mark = _STYLES[policy]
+    mean = curves.mean(result, policy, metric)
+    low, high = curves.band(result, policy, metric)
+    added = np.arange(len(mean))
+    axis.fill_between(added, low, high, color=colour, alpha=0.15, linewidth=0)
+    axis.plot(added, mean, color=colour, marker=mark, markersize=4.5, linewidth=1.6, label=name)
+
+
+def _logarithmic(axis: Axes) -> None:
+    low, high = axis.get_ylim()
+    # Over less than a factor of four a logarithmic axis has hardly a number to show and nothing to gain.
+    if low > 0 and high / low < 4:
+        return
+    axis.set_yscale("log")
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
+    if high / low < 50:
+        axis.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: _minor_label(value)))
+        axis.tick_params(axis="y", which="minor", labelsize="small")
+    else:
+        axis.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _minor_label(value: float) -> str:
+    """Label 2, 3 and 5 of each decade only."""
+    digit = round(value / 10 ** np.floor(np.log10(value) + 1e-9))
+    return f"{value:.3g}" if digit in {2, 3, 5} else ""
+
+
+def scatter_figure(curves: Curves) -> Figure:
+    """Draw predicted gain against reduction of the held-out RMSE: a panel per set, all first candidates."""
+    count = len(curves.sets)
+    columns = min(count, 3)
+    rows = -(-count // columns)
+    figure = Figure(figsize=(3.6 * columns, 3.2 * rows + 0.5), layout="constrained", dpi=150)
+    for i, result in enumerate(curves.sets):
+        axis = figure.add_subplot(rows, columns, i + 1)
+        _scatter(axis, result)
+        if i % columns == 0:
+            axis.set_ylabel("reduction of held-out RMSE (px)")
+        if i >= count - columns:
+            axis.set_xlabel("predicted gain (nats)")
+    figure.suptitle(
+        f"every candidate of the first step, model {curves.model.value}; "
+        f"Pearson's r within a start, median {curves.median_correlation:.2f}",
+        fontsize="medium",
+    )
+    return figure
+
+
+def _scatter(axis: Axes, result: SetResult) -> None:
+    found = scatters(result)
+    gains = np.array([g for s in found for g in s.predicted_gain_nats])
+    reductions = np.array([r for s in found for r in s.rmse_reduction_px])
+    colour = _STYLES["next_best_view"][1]
+    axis.scatter(gains, reductions, s=7, color=colour, alpha=0.35, linewidths=0, rasterized=True)
+    axis.axhline(0, color="0.4", linewidth=0.8)
+    _without_far_values(axis, reductions)
+    axis.grid(visible=True, alpha=0.25, linewidth=0.6)
+    inside = correlations(result)
+    typical = f"{np.median(inside):.2f}" if inside else "none"
+    axis.set_title(f"{result.name}: r {typical}", fontsize="medium")
+
+
+def _without_far_values(axis: Axes, values: Sequence[float] | np.ndarray) -> None:
+    """Show the inner 98 percent of the values, and say how many lie outside."""
+    low, high = np.percentile(values, [1, 99])
+    margin = 0.08 * max(high - low, 1e-12)
+    outside = int(np.sum((values < low - margin) | (values > high + margin)))
+    axis.set_ylim(low - margin, high + margin)
+    if outside:
+        axis.text(
+            0.98,
+            0.03,
+            f"{outside} outside",
+            transform=axis.transAxes,
+            ha="right",
+            fontsize="small",
+            alpha=0.7,
+        )

@@ -1,0 +1,286 @@
+"""Made-up cells: an arm, a camera, a board, and errors of a known kind, for Monte Carlo.
+
+A cell is drawn at random within what is usual: a UR5e, a board of 8 x 11 corners, views from 0.4 to 0.8 m
+under up to 40 degrees. The reported robot poses are wrong by one kind of error, the camera's parameters by
+what an ordinary calibration leaves.
+"""
+
+import zlib
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from handeye import _core
+from handeye.errors import SolveError
+from handeye.evaluation.arm import Arm
+from handeye.evaluation.metrics import inverses
+from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Target, Truth, View
+from handeye.types.arrays import FloatArray
+
+
+class ErrorKind(StrEnum):
+    """What is wrong besides the pixels; the camera's parameters are always known only from a calibration."""
+
+    PIXEL_ONLY = "pixel_only"
+    """Nothing: the robot is exact."""
+    WHITE_FLANGE = "white_flange"
+    """Each pose off by its own twist in the flange frame."""
+    WHITE_BASE = "white_base"
+    """Each pose off by its own twist in the base frame."""
+    ENCODER = "encoder"
+    """Each joint angle off by its own error at each view."""
+    JOINT_OFFSETS = "joint_offsets"
+    """Joint angles off by constants; of joints 2 to 5, as the others only say where base and flange are."""
+    SMOOTH_KINEMATIC = "smooth_kinematic"
+    """Lengths and twists of the links off by constants: an error that changes smoothly with the posture."""
+    WRONG_INTRINSICS = "wrong_intrinsics"
+    """The robot is exact; the camera's parameters are off by more than their covariance says."""
+
+
+@dataclass(frozen=True)
+class CellOptions:
+    """What a cell is drawn from; ranges are drawn from uniformly, levels of errors log-uniformly.
+
+    Parameters
+    ----------
+    views
+        Fewest and most views.
+    pixel_sigma_px
+        Noise of the pixels per axis.
+    translation_sigma_m, rotation_sigma_deg
+        Levels of the robot's white error per axis.
+    encoder_sigma_deg, offset_sigma_deg
+        Levels of the error of the joint angles.
+    length_sigma_m, twist_sigma_deg
+        Levels of the error of the links.
+    calibration_views
+        Views that the camera was calibrated with.
+    intrinsics_factor
+        By how much the camera's deviation exceeds what its covariance says under `wrong_intrinsics`.
+    """
+
+    mounting: Mounting = Mounting.EYE_IN_HAND
+    views: tuple[int, int] = (8, 12)
+    pixel_sigma_px: tuple[float, float] = (0.05, 0.2)
+    translation_sigma_m: tuple[float, float] = (0.05e-3, 0.5e-3)
+    rotation_sigma_deg: tuple[float, float] = (0.005, 0.05)
+    encoder_sigma_deg: tuple[float, float] = (0.003, 0.03)
+    offset_sigma_deg: tuple[float, float] = (0.005, 0.05)
+    length_sigma_m: tuple[float, float] = (0.05e-3, 0.5e-3)
+    twist_sigma_deg: tuple[float, float] = (0.005, 0.05)
+    calibration_views: int = 20
+    intrinsics_factor: float = 2.0
+    distance_m: tuple[float, float] = (0.4, 0.8)
+    tilt_deg: tuple[float, float] = (0.0, 40.0)
+    roll_deg: tuple[float, float] = (-90.0, 90.0)
+
+
+TARGET = Chessboard(8, 11, 0.025)
+LENS = "brown_conrady_5"
+PARAMETERS = np.array([1400.0, 1400.0, 640.0, 512.0, -0.1, 0.05, 0.0005, -0.0005, 0.0])
+SIZE_PX = (1280, 1024)
+MARGIN_PX = 20.0
+# Elbow up, tool down, in front of the robot.
+POSTURE_RAD = np.deg2rad([0.0, -110.0, 110.0, -90.0, -90.0, 0.0])
+MOST_ATTEMPTS = 2000
+
+
+def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *, seed: int = 0) -> Recording:
+    """Return the recording of a cell with its truth, the same for the same number and seed.
+
+    Raises
+    ------
+    SolveError
+        No views could be drawn within these options.
+    """
+    options = options or CellOptions()
+    kind = ErrorKind(kind)
+    random = np.random.default_rng([seed, zlib.crc32(kind.encode()), number])
+    arm = Arm()
+    pixel_sigma = _level(random, options.pixel_sigma_px)
+    calibrated = Camera(LENS, PARAMETERS, *SIZE_PX)
+    covariance = _calibration_covariance(random, calibrated, pixel_sigma, options)
+    deviation = random.multivariate_normal(np.zeros(len(PARAMETERS)), covariance, method="cholesky")
+    if kind is ErrorKind.WRONG_INTRINSICS:
+        deviation *= options.intrinsics_factor
+    true_camera = Camera(LENS, PARAMETERS + deviation, *SIZE_PX)
+    X, Y = _mount(random, options.mounting)
+    count = int(random.integers(options.views[0], options.views[1] + 1))
+    joints, camera_poses = _views(random, arm, true_camera, X, Y, count, options)
+    reported = _reported(random, kind, arm, joints, options)
+    views: list[View] = []
+    ids = np.arange(TARGET.point_count)
+    for k, (pose, T_camera_target) in enumerate(zip(reported, camera_poses, strict=True)):
+        pixels, _ = true_camera.project(_in_camera(T_camera_target))
+        pixels = pixels + pixel_sigma * random.standard_normal(pixels.shape)
+        views.append(View(f"view_{k + 1:02d}", Pose(pose), ids, pixels, joints_rad=joints[k].tolist()))
+    return Recording(
+        f"simulated {kind.value} {number}",
+        options.mounting,
+        Camera(LENS, PARAMETERS, *SIZE_PX, covariance=covariance),
+        TARGET,
+        tuple(views),
+        Truth(X, Y),
+        "simulated",
+    )
+
+
+def _level(random: np.random.Generator, bounds: tuple[float, float]) -> float:
+    low, high = bounds
+    return low * (high / low) ** random.uniform()
+
+
+def _in_camera(T_camera_target: FloatArray, target: Target = TARGET) -> FloatArray:
+    return target.points @ T_camera_target[:3, :3].T + T_camera_target[:3, 3]
+
+
+def _twist(random: np.random.Generator, metres: float, degrees: float) -> FloatArray:
+    return np.concatenate([random.normal(0, metres, 3), random.normal(0, np.deg2rad(degrees), 3)])
+
+
+def _look(down: FloatArray) -> FloatArray:
+    """Return a pose (4, 4) at a place (3,), with its z axis down."""
+    pose = np.diag([1.0, -1.0, -1.0, 1.0])
+    pose[:3, 3] = down
+    return pose
+
+
+def _mount(random: np.random.Generator, mounting: Mounting) -> tuple[Pose, Pose]:
+    """Draw X and Y of the chain."""
+    jitter = Pose.exp(_twist(random, 0.05, 15.0)) @ Pose.exp([0, 0, 0, 0, 0, random.uniform(-np.pi, np.pi)])
+    if mounting is Mounting.EYE_IN_HAND:
+        # The camera beside the tool, looking along it; the board flat on the table, its z axis down.
+        T_flange_camera = Pose.exp([0.05, 0, 0.06, 0, 0, 0]) @ jitter
+        at = np.array([random.uniform(0.35, 0.5), random.uniform(-0.15, 0.15), random.uniform(-0.35, -0.1)])
+        T_base_target = Pose(_look(at)) @ Pose.exp(_twist(random, 0.0, 5.0))
+        return T_flange_camera.inverse(), T_base_target
+    # The camera above the table, looking down; the board on the flange, facing away from it.
+    at = np.array([random.uniform(0.35, 0.5), random.uniform(-0.15, 0.15), random.uniform(0.9, 1.1)])
+    T_base_camera = Pose(_look(at)) @ Pose.exp(_twist(random, 0.0, 10.0))
+    T_flange_target = Pose.exp([0, 0, 0.05, 0, 0, 0]) @ jitter @ Pose(_look(np.zeros(3)))
+    return T_base_camera.inverse(), T_flange_target
+
+
+def _camera_pose(random: np.random.Generator, camera: Camera, options: CellOptions) -> FloatArray | None:
+    """Draw `T_camera_target` (4, 4) such that the whole board is in the image; None if this draw is not."""
+    tilt = np.deg2rad(random.uniform(*options.tilt_deg))
+    azimuth = random.uniform(-np.pi, np.pi)
+    roll = np.deg2rad(random.uniform(*options.roll_deg))
+    axes = [[0, 0, 0, 0, 0, roll], [0, 0, 0, tilt * np.cos(azimuth), tilt * np.sin(azimuth), 0]]
+    turns = _core.se3_exp(np.array(axes))
+    pose = turns[0] @ turns[1]
+    distance = random.uniform(*options.distance_m)
+    fx, fy, cx, cy = camera.parameters[:4]
+    # The board's centre in the inner part of the image: elsewhere it would rarely be seen whole.
+    u, v = random.uniform([0.2, 0.2], [0.8, 0.8]) * SIZE_PX
+    centre = TARGET.points.mean(axis=0)
+    aim = np.array([(u - cx) / fx, (v - cy) / fy, 1.0]) * distance
+    pose[:3, 3] = aim - pose[:3, :3] @ centre
+    pixels, seen = _core.project(camera.lens, camera.parameters, _in_camera(pose))
+    inside = (pixels >= MARGIN_PX) & (pixels <= np.array(SIZE_PX) - 1 - MARGIN_PX)
+    return pose if seen.all() and inside.all() else None
+
+
+def _views(
+    random: np.random.Generator,
+    arm: Arm,
+    camera: Camera,
+    X: Pose,
+    Y: Pose,
+    count: int,
+    options: CellOptions,
+) -> tuple[FloatArray, FloatArray]:
+    """Draw joint angles (K, 6) within reach, and `T_camera_target` (K, 4, 4) there."""
+    joints: list[FloatArray] = []
+    poses: list[FloatArray] = []
+    for _ in range(MOST_ATTEMPTS):
+        pose = _camera_pose(random, camera, options)
+        if pose is None:
+            continue
+        chain = X.inverse().matrix @ pose @ Y.inverse().matrix
+        flange = inverses(chain) if options.mounting is Mounting.EYE_IN_HAND else chain
+        try:
+            found = arm.inverse(flange, _posture(arm, flange))
+        except SolveError:
+            continue
+        joints.append(found)
+        poses.append(pose)
+        if len(joints) == count:
+            return np.array(joints), np.array(poses)
+    raise SolveError(
+        f"{len(joints)} of {count} views found in {MOST_ATTEMPTS} attempts",
+        code="no_views",
+        hint="allow other distances or smaller tilts",
+    )
+
+
+def _posture(arm: Arm, T_base_flange: FloatArray) -> FloatArray:
+    """Return a posture (6,) that is near a pose: the arm turned towards it, the last joint turned with it."""
+    posture = POSTURE_RAD.copy()
+    posture[0] = np.arctan2(-T_base_flange[1, 3], -T_base_flange[0, 3])  # at zero the links extend along -x
+    turn = arm.forward(posture)[:3, :3].T @ T_base_flange[:3, :3]
+    posture[5] = np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
+    return posture
+
+
+def _calibration_covariance(
+    random: np.random.Generator, camera: Camera, pixel_sigma: float, options: CellOptions
+) -> FloatArray:
+    """Covariance (n, n) that a calibration of the camera from views of the same board reaches."""
+    information = np.zeros((len(camera.parameters),) * 2)
+    count = 0
+    while count < options.calibration_views:
+        pose = _camera_pose(random, camera, options)
+        if pose is None:
+            continue
+        information += camera_information(camera, TARGET, pose)
+        count += 1
+    return symmetric(np.asarray(np.linalg.inv(information), np.float64) * pixel_sigma**2)
+
+
+def camera_information(camera: Camera, target: Target, T_camera_target: FloatArray) -> FloatArray:
+    """(n, n) information about the camera's parameters in a view of unknown pose, at a noise of 1 px."""
+    points = _in_camera(T_camera_target, target)
+    _, in_point, in_parameters, _ = _core.project_jacobians(camera.lens, camera.parameters, points)
+    # d(point)/d(left twist) = [I, -[point]x]
+    cross = np.zeros((len(points), 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = points[:, 2], -points[:, 1], points[:, 0]
+    cross -= np.swapaxes(cross, 1, 2)
+    in_pose = np.concatenate([in_point, in_point @ cross], axis=2).reshape(-1, 6)
+    in_camera = in_parameters.reshape(len(in_pose), -1)
+    mixed = in_pose.T @ in_camera
+    return in_camera.T @ in_camera - mixed.T @ np.linalg.solve(in_pose.T @ in_pose, mixed)
+
+
+def symmetric(matrix: FloatArray) -> FloatArray:
+    """Return the symmetric part of a matrix that is symmetric but for rounding."""
+    return 0.5 * (matrix + matrix.T)
+
+
+def _reported(
+    random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray, options: CellOptions
+) -> FloatArray:
+    """`T_base_flange` (K, 4, 4) as the robot reports it, where it truly stood at `joints` (K, 6)."""
+    true = arm.forward(joints)
+    if kind in {ErrorKind.WHITE_FLANGE, ErrorKind.WHITE_BASE}:
+        metres = _level(random, options.translation_sigma_m)
+        degrees = _level(random, options.rotation_sigma_deg)
+        errors = _core.se3_exp(np.array([_twist(random, metres, degrees) for _ in joints]))
+        return true @ errors if kind is ErrorKind.WHITE_FLANGE else errors @ true
+    if kind is ErrorKind.ENCODER:
+        sigma = np.deg2rad(_level(random, options.encoder_sigma_deg))
+        return arm.forward(joints + sigma * random.standard_normal(joints.shape))
+    if kind is ErrorKind.JOINT_OFFSETS:
+        offsets = np.deg2rad(_level(random, options.offset_sigma_deg)) * random.standard_normal(6)
+        offsets[[0, 5]] = 0.0
+        return arm.forward(joints + offsets)
+    if kind is ErrorKind.SMOOTH_KINEMATIC:
+        wrong = arm.parameters.copy()
+        wrong[:, :2] += _level(random, options.length_sigma_m) * random.standard_normal((6, 2))
+        twist = np.deg2rad(_level(random, options.twist_sigma_deg))
+        wrong[:, 2] += twist * random.standard_normal(6)
+        # Where base and flange are is a matter of names: the last link ends in the flange.
+        wrong[0, 1], wrong[5] = arm.parameters[0, 1], arm.parameters[5]
+        return Arm(wrong).forward(joints)
+    return true

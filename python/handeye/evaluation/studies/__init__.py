@@ -1,0 +1,20 @@
+"""The studies: one file per table or figure, each a function from recordings to a result with `to_dict`."""
+
+from handeye.evaluation.studies.coverage import Coverage, study_coverage
+from handeye.evaluation.studies.curves import Curves, study_curves
+from handeye.evaluation.studies.holdout import Holdout, study_holdout
+from handeye.evaluation.studies.injected import Injected, study_injected
+from handeye.evaluation.studies.table1 import Table1, study_table1
+
+__all__ = [
+    "Coverage",
+    "Curves",
+    "Holdout",
+    "Injected",
+    "Table1",
+    "study_coverage",
+    "study_curves",
+    "study_holdout",
+    "study_injected",
+    "study_table1",
+]
