@@ -138,7 +138,7 @@ def affine(source: FloatArray, destination: FloatArray) -> tuple[FloatArray, Flo
     centre = source.mean(axis=0)
     shift = destination.mean(axis=0)
     flat = source - centre
-    A = np.asarray(np.linalg.solve(flat.T @ flat, flat.T @ (destination - shift)), dtype=np.float64)
+    A = np.asarray(np.linalg.pinv(flat) @ (destination - shift), dtype=np.float64)
     return A, shift - centre @ A
 
 

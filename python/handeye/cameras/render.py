@@ -1,0 +1,223 @@
+"""Pictures of a target through a lens, by rays.
+
+A pixel's grey value is the mean over its square of what the lens sees there: rays of the true inverse of the
+lens model go through its corners to the plane of the target, and pixels through which an edge passes are
+sampled many times. Nothing is resampled, so edges are where geometry puts them, to a few thousandths of a
+pixel.
+"""
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handeye.cameras.pattern import Mask, Pattern, pattern_of
+from handeye.errors import InputError
+from handeye.types import Camera, Pose, Target
+from handeye.types.arrays import FloatArray
+
+Image = NDArray[np.uint8]
+# Pixels sampled at a time: bounds the memory.
+_CHUNK = 20_000
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """How a picture looks.
+
+    Parameters
+    ----------
+    dark, light, background
+        Grey values of ink, board and everything else, 0 to 255; the background may be an image (H, W).
+    margin_m
+        Width of the light margin around the print; None for a tenth of the print.
+    gradient
+        Change of the light across the image, as a share of its mean, to the right and downwards.
+    blur_px
+        Standard deviation of a Gaussian blur.
+    noise
+        Standard deviation of the noise, in grey values.
+    supersampling
+        Samples along each side of a pixel that an edge passes through.
+    """
+
+    dark: float = 25.0
+    light: float = 215.0
+    background: float | Image = 110.0
+    margin_m: float | None = None
+    gradient: tuple[float, float] = (0.0, 0.0)
+    blur_px: float = 0.0
+    noise: float = 0.0
+    supersampling: int = 8
+
+
+@dataclass
+class BoardRenderer:
+    """Renders one target through one camera; the rays of the pixels are computed once.
+
+    Raises
+    ------
+    InputError
+        A family of targets that cannot be drawn, or a background that is not of the camera's size.
+    """
+
+    camera: Camera
+    target: Target
+    appearance: Appearance = field(default_factory=Appearance)
+
+    def __post_init__(self) -> None:
+        """Trace the rays."""
+        width, height = self.camera.size_px
+        look = self.appearance
+        if isinstance(look.background, np.ndarray) and look.background.shape != (height, width):
+            raise InputError(
+                f"background: shape {look.background.shape}, expected {(height, width)}", code="wrong_shape"
+            )
+        self._pattern = pattern_of(self.target)
+        span = self._pattern.high - self._pattern.low
+        margin = 0.1 * float(span.max()) if look.margin_m is None else look.margin_m
+        self._low, self._high = self._pattern.low - margin, self._pattern.high + margin
+        u, v = np.meshgrid(np.arange(width + 1) - 0.5, np.arange(height + 1) - 0.5)
+        rays, _ = self.camera.unproject(np.column_stack([u.ravel(), v.ravel()]))
+        self._rays = rays.reshape(height + 1, width + 1, 3)
+
+    def image(self, T_camera_target: Pose, random: np.random.Generator | None = None) -> Image:
+        """Return the picture (H, W) of the target in a pose.
+
+        Parameters
+        ----------
+        T_camera_target
+            The pose.
+        random
+            Source of the noise; needed if there is noise.
+
+        Raises
+        ------
+        InputError
+            Noise without a source.
+        """
+        look = self.appearance
+        if look.noise > 0 and random is None:
+            raise InputError("noise needs a random generator", code="invalid_field")
+        board, ink = self._shares(T_camera_target)
+        grey = look.background * (1 - board) + look.light * (board - ink) + look.dark * ink
+        if look.gradient != (0.0, 0.0):
+            grey = grey * _light(grey.shape, look.gradient)
+        if look.blur_px > 0:
+            grey = cv2.GaussianBlur(grey, (0, 0), look.blur_px, borderType=cv2.BORDER_REPLICATE)
+        if random is not None and look.noise > 0:
+            grey = grey + random.normal(scale=look.noise, size=grey.shape)
+        return np.rint(np.clip(grey, 0, 255)).astype(np.uint8)
+
+    def _shares(self, T_camera_target: Pose) -> tuple[FloatArray, FloatArray]:
+        """Return the shares (H, W) of every pixel's area that show the board, and ink."""
+        corners = self._plane(T_camera_target)
+        height, width = corners.shape[0] - 1, corners.shape[1] - 1
+        on_board, dark = (part.reshape(corners.shape[:2]) for part in self._look(corners.reshape(-1, 2)))
+        board, ink = _mean_of_corners(on_board), _mean_of_corners(dark)
+        finite = np.isfinite(corners[..., 0])
+        whole = _mean_of_corners(finite) == 1
+        mixed = whole & ((board % 1 != 0) | (ink % 1 != 0) | self._is_coarse(corners, board))
+        rows, columns = np.nonzero(mixed)
+        for start in range(0, len(rows), _CHUNK):
+            part = rows[start : start + _CHUNK], columns[start : start + _CHUNK]
+            board[part], ink[part] = self._sample(corners, *part)
+        board[~whole] = ink[~whole] = 0.0
+        return board.reshape(height, width), ink.reshape(height, width)
+
+    def _plane(self, T_camera_target: Pose) -> FloatArray:
+        """Return where (H + 1, W + 1, 2) the rays meet the plane of the target; NaN where they do not."""
+        T_target_camera = T_camera_target.inverse().matrix
+        eye = T_target_camera[:3, 3]
+        if eye[2] >= 0:  # behind the board
+            return np.full((*self._rays.shape[:2], 2), np.nan)
+        direction = self._rays @ T_target_camera[:3, :3].T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = -eye[2] / direction[:, :, 2]
+            plane = eye[:2] + distance[:, :, np.newaxis] * direction[:, :, :2]
+        plane[~(distance > 0)] = np.nan
+        return plane
+
+    def _look(self, plane: FloatArray) -> tuple[Mask, Mask]:
+        """Tell which places (N, 2) are on the board, and which are dark."""
+        with np.errstate(invalid="ignore"):
+            on_board = np.all((plane >= self._low) & (plane <= self._high), axis=1)
+        dark = np.zeros(len(plane), dtype=bool)
+        dark[on_board] = self._pattern.is_dark(plane[on_board])
+        return on_board, dark
+
+    def _is_coarse(self, corners: FloatArray, board: FloatArray) -> Mask:
+        """Tell which pixels of the board might swallow a detail between their corners."""
+        with np.errstate(invalid="ignore"):
+            across = np.abs(corners[1:, 1:] - corners[:-1, :-1]).max(axis=2)
+            along = np.abs(corners[1:, :-1] - corners[:-1, 1:]).max(axis=2)
+            return (board > 0) & (np.maximum(across, along) > 0.4 * self._pattern.finest_m)
+
+    def _sample(
+        self, corners: FloatArray, rows: NDArray[np.int64], columns: NDArray[np.int64]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the shares (N,) of board and ink in some pixels."""
+        n = self.appearance.supersampling
+        across = (np.arange(n) + 0.5) / n
+        s, t = (axis.ravel()[:, np.newaxis] for axis in np.meshgrid(across, across))
+        # Within one pixel lens and perspective are linear to far below a thousandth of a pixel.
+        plane = (
+            corners[rows, columns][:, np.newaxis] * ((1 - s) * (1 - t))
+            + corners[rows, columns + 1][:, np.newaxis] * (s * (1 - t))
+            + corners[rows + 1, columns][:, np.newaxis] * ((1 - s) * t)
+            + corners[rows + 1, columns + 1][:, np.newaxis] * (s * t)
+        )
+        on_board, dark = self._look(plane.reshape(-1, 2))
+        return on_board.reshape(-1, n * n).mean(axis=1), dark.reshape(-1, n * n).mean(axis=1)
+
+
+def render(
+    camera: Camera,
+    target: Target,
+    T_camera_target: Pose,
+    appearance: Appearance | None = None,
+    *,
+    random: np.random.Generator | None = None,
+) -> Image:
+    """Return one picture (H, W) of a target; for several, keep a `BoardRenderer`.
+
+    Raises
+    ------
+    InputError
+        As `BoardRenderer` and its `image`.
+    """
+    return BoardRenderer(camera, target, appearance or Appearance()).image(T_camera_target, random)
+
+
+def clutter(width_px: int, height_px: int, random: np.random.Generator, *, shapes: int = 150) -> Image:
+    """Return a background (H, W) full of boxes and ellipses of all sizes and greys."""
+    image = np.full((height_px, width_px), 110, dtype=np.uint8)
+    for _ in range(shapes):
+        centre = random.uniform(0, [width_px, height_px])
+        size = random.uniform(0.005, 0.12, 2) * max(width_px, height_px)
+        angle, grey = float(random.uniform(0, 180)), float(random.uniform(10, 240))
+        box = ((float(centre[0]), float(centre[1])), (float(size[0]), float(size[1])), angle)
+        if random.uniform() < 0.5:
+            cv2.ellipse(image, box, grey, -1, cv2.LINE_AA)
+        else:
+            corners = np.rint(cv2.boxPoints(box)).astype(np.int32)
+            cv2.fillConvexPoly(image, corners, grey, cv2.LINE_AA)
+    return image
+
+
+def _mean_of_corners(values: Mask) -> FloatArray:
+    """Return the mean (H, W) over the four corners (H + 1, W + 1) of each pixel."""
+    grey = values.astype(np.float64)
+    return (grey[:-1, :-1] + grey[:-1, 1:] + grey[1:, :-1] + grey[1:, 1:]) / 4
+
+
+def _light(shape: tuple[int, ...], gradient: tuple[float, float]) -> FloatArray:
+    """Return the light (H, W) that changes across the image, with mean one."""
+    height, width = shape[:2]
+    right = np.linspace(-0.5, 0.5, width) * gradient[0]
+    down = np.linspace(-0.5, 0.5, height) * gradient[1]
+    return 1 + right + down[:, np.newaxis]
+
+
+__all__ = ["Appearance", "BoardRenderer", "Image", "Pattern", "clutter", "render"]
