@@ -389,7 +389,7 @@ class Chain:
         tolerance_m: float = 1e-9,
         tolerance_rad: float = 1e-9,
         steps: int = 60,
-        attempts: int = 40,
+        attempts: int = 100,
     ) -> tuple[NDArray[float64], list[bool], list[tuple[float, float]]]:
         """Joints (N, n) within the limits for poses (N, 4, 4), from starts (N, n) and then from others.
 

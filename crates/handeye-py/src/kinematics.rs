@@ -113,7 +113,7 @@ impl Chain {
     }
 
     /// Joints `(N, n)` that reach poses `(N, 4, 4)`, which of them do, and how far off the others are (m, rad).
-    #[pyo3(signature = (goals, starts, *, tolerance_m=1e-9, tolerance_rad=1e-9, steps=60, attempts=40))]
+    #[pyo3(signature = (goals, starts, *, tolerance_m=1e-9, tolerance_rad=1e-9, steps=60, attempts=100))]
     #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
     fn inverse<'py>(
         &self,

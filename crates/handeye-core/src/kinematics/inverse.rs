@@ -26,7 +26,7 @@ pub struct InverseOptions {
 
 impl Default for InverseOptions {
     fn default() -> Self {
-        Self { tolerance_m: 1e-9, tolerance_rad: 1e-9, steps: 60, attempts: 40 }
+        Self { tolerance_m: 1e-9, tolerance_rad: 1e-9, steps: 60, attempts: 100 }
     }
 }
 

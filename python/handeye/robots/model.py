@@ -1,0 +1,256 @@
+"""An arm: its joints, where its flange is, how that moves, and which joint positions reach a pose."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from handeye import _core
+from handeye.errors import InputError, SolveError
+from handeye.types.arrays import FloatArray, finite_array
+from handeye.types.pose import Pose
+
+MAX_JOINTS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint that moves.
+
+    Parameters
+    ----------
+    name
+        As in the description of the arm.
+    placement
+        Its frame at position zero in the frame of the joint before it, or in the base.
+    axis
+        (3,) direction of its axis in its own frame.
+    sliding
+        Whether it slides along its axis (metres) rather than turns about it (radians).
+    lower, upper
+        Limits of its position; infinite if there are none.
+    velocity
+        Largest speed per second; infinite if unknown.
+    """
+
+    name: str
+    placement: Pose
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    sliding: bool = False
+    lower: float = -np.inf
+    upper: float = np.inf
+    velocity: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A serial arm of n joints that move.
+
+    Parameters
+    ----------
+    name
+        What it is.
+    joints
+        Base first.
+    T_last_flange
+        The flange in the frame of the last joint.
+    base, flange
+        Names of the frames at its ends.
+
+    Raises
+    ------
+    InputError
+        No joint or more than 16, two of one name, an axis without direction, limits in the wrong order.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    T_last_flange: Pose = field(default_factory=Pose.identity)
+    base: str = "base"
+    flange: str = "flange"
+
+    def __post_init__(self) -> None:
+        names = self.joint_names
+        if not 1 <= len(names) <= MAX_JOINTS:
+            raise InputError(
+                f"arm {self.name}: {len(names)} joints that move, expected 1 to {MAX_JOINTS}",
+                code="unusable_arm",
+            )
+        if len(set(names)) < len(names):
+            raise InputError(f"arm {self.name}: two joints of one name", code="unusable_arm")
+        for joint in self.joints:
+            if not joint.velocity > 0:
+                raise InputError(
+                    f"arm {self.name}: joint {joint.name}: a largest speed of {joint.velocity}",
+                    code="unusable_arm",
+                )
+        self._chain  # noqa: B018 - checks what the core checks
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave the core's copy behind: it is made anew where the arm is unpacked."""
+        return {key: value for key, value in self.__dict__.items() if key != "_chain"}
+
+    @cached_property
+    def _chain(self) -> _core.Chain:
+        return _core.Chain(
+            np.array([joint.placement.matrix for joint in self.joints]),
+            np.array([joint.axis for joint in self.joints], dtype=float),
+            [joint.sliding for joint in self.joints],
+            self.limits,
+            self.T_last_flange.matrix,
+        )
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, base first."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def sliding(self) -> tuple[bool, ...]:
+        """Whether each joint slides."""
+        return tuple(joint.sliding for joint in self.joints)
+
+    @property
+    def limits(self) -> FloatArray:
+        """(n, 2) lower and upper limits, radians or metres."""
+        return np.array([[joint.lower, joint.upper] for joint in self.joints], dtype=float)
+
+    @property
+    def velocities(self) -> FloatArray:
+        """(n,) largest speeds, radians or metres per second; infinite where unknown."""
+        return np.array([joint.velocity for joint in self.joints], dtype=float)
+
+    def with_flange(self, T_flange_tool: Pose, name: str = "tool") -> "Arm":
+        """Return the arm with another frame at its end, `T_flange_tool` away from the flange of this one."""
+        return replace(self, T_last_flange=self.T_last_flange @ T_flange_tool, flange=name)
+
+    def forward(self, joints: ArrayLike) -> FloatArray:
+        """(..., 4, 4) `T_base_flange` at joint positions (..., n).
+
+        Raises
+        ------
+        InputError
+            Another number of joints, or a position that is not finite.
+        """
+        flat, shape = self._positions(joints)
+        return self._chain.forward(flat).reshape(*shape, 4, 4)
+
+    def jacobian(self, joints: ArrayLike, frame: str = "flange") -> FloatArray:
+        """(..., 6, n) twists `[rho; phi]` of the flange per joint at positions (..., n).
+
+        ``T(q + dq) = T(q) exp(J dq)`` for the frame "flange", ``exp(J dq) T(q)`` for "base".
+
+        Raises
+        ------
+        InputError
+            Another number of joints, a position that is not finite, or another frame.
+        """
+        flat, shape = self._positions(joints)
+        return self._chain.jacobians(flat, frame).reshape(*shape, 6, len(self))
+
+    def inverse(
+        self, T_base_flange: Pose, start: ArrayLike | None = None, *, attempts: int = 100
+    ) -> FloatArray:
+        """(n,) joint positions within the limits that reach a pose, from a posture (n,) near which to stay.
+
+        Without a start from the middle of the limits. Where the way from the start does not lead to the
+        pose, others are tried: the answer is then a posture of its own.
+
+        Raises
+        ------
+        SolveError
+            None was found; the message says how near the arm comes.
+        """
+        first = self.middle if start is None else finite_array(start, (len(self),), "start")
+        found, reached, off = self._chain.inverse(
+            T_base_flange.matrix[np.newaxis], first[np.newaxis], attempts=attempts
+        )
+        if not reached[0]:
+            metres, radians = off[0]
+            raise SolveError(
+                f"arm {self.name} does not reach the pose within its joint limits: it comes within "
+                f"{metres * 1e3:.1f} mm and {np.rad2deg(radians):.2f} deg",
+                code="out_of_reach",
+                hint="choose a pose nearer to the base, or another orientation",
+            )
+        return found[0]
+
+    def inverse_all(
+        self, T_base_flange: ArrayLike, start: ArrayLike | None = None, *, attempts: int = 100
+    ) -> tuple[FloatArray, FloatArray]:
+        """(N, n) joint positions that reach poses (N, 4, 4), and which (N,) are reached.
+
+        From one posture (n,) for all or one for each (N, n); rows of poses that are not reached hold the
+        nearest posture found.
+
+        Raises
+        ------
+        InputError
+            Not rigid, or a wrong shape.
+        """
+        goals = finite_array(T_base_flange, (None, 4, 4), "T_base_flange")
+        first = np.broadcast_to(
+            self.middle if start is None else np.asarray(start, float), (len(goals), len(self))
+        )
+        found, reached, _ = self._chain.inverse(goals, first, attempts=attempts)
+        return found, np.array(reached, dtype=bool)
+
+    def postures(self, T_base_flange: Pose, *, attempts: int = 100) -> FloatArray:
+        """(S, n) all different joint positions found that reach a pose; none if it is out of reach."""
+        return self._chain.postures(T_base_flange.matrix, attempts=attempts)
+
+    @property
+    def middle(self) -> FloatArray:
+        """(n,) a posture a little off the middle of the limits, at which many arms are stretched."""
+        low, high = self.limits.T
+        bounded = np.isfinite(low) & np.isfinite(high)
+        middle = np.where(bounded, 0.5 * (np.where(bounded, low, 0) + np.where(bounded, high, 0)), 0.0)
+        return np.clip(middle + 0.1, low, high)
+
+    def within_limits(self, joints: ArrayLike) -> bool:
+        """Tell whether all positions (..., n) lie within the limits."""
+        flat, _ = self._positions(joints)
+        low, high = self.limits.T
+        return bool(np.all((flat >= low) & (flat <= high)))
+
+    def _positions(self, joints: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
+        array = np.asarray(joints, dtype=float)
+        if array.ndim < 1 or array.shape[-1] != len(self):
+            raise InputError(
+                f"arm {self.name}: joint positions of shape {array.shape}, expected (..., {len(self)}): "
+                + ", ".join(self.joint_names),
+                code="wrong_shape",
+            )
+        return array.reshape(-1, len(self)), array.shape[:-1]
+
+
+def denavit_hartenberg(
+    name: str, rows: Sequence[tuple[float, float, float, float]], limits: ArrayLike, velocities: ArrayLike
+) -> Arm:
+    """Return an arm from standard parameters (Denavit and Hartenberg 1955): a (m), d (m), alpha, offset.
+
+    Joint i: ``T = Rz(q + offset) Tz(d) Tx(a) Rx(alpha)``; all joints turn. `limits` (n, 2) in radians,
+    `velocities` (n,) in radians per second.
+    """
+    before = Pose.identity()
+    joints: list[Joint] = []
+    bounds = finite_array(limits, (len(rows), 2), "limits")
+    speeds = finite_array(velocities, (len(rows),), "velocities")
+    for i, (a, d, alpha, offset) in enumerate(rows):
+        turned = before @ Pose.exp([0, 0, 0, 0, 0, offset])
+        joints.append(
+            Joint(
+                f"joint_{i + 1}",
+                turned,
+                lower=float(bounds[i, 0]),
+                upper=float(bounds[i, 1]),
+                velocity=float(speeds[i]),
+            )
+        )
+        before = Pose.exp([a, 0, d, 0, 0, 0]) @ Pose.exp([0, 0, 0, alpha, 0, 0])
+    return Arm(name, tuple(joints), before)

@@ -1,0 +1,132 @@
+"""From an arm to what an estimate needs of it: the Jacobians of the motions that the robot reports.
+
+The frames of a description and those of a controller need not be the same: the controller may report a tool,
+or have its base turned by half a turn. Both are constant transforms, found from the views themselves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from handeye import _core
+from handeye.errors import HandeyeError, InputError
+from handeye.robots.model import Arm
+from handeye.types.arrays import FloatArray
+from handeye.types.mounting import Mounting
+from handeye.types.pose import Pose
+from handeye.types.view import View
+
+# Reported poses may be off the description by this much (root mean square) and still be those of the arm: an
+# arm calibrated by its maker is millimetres off its nominal measures.
+AGREEMENT_M = 0.01
+AGREEMENT_RAD = np.deg2rad(1.0)
+# Fewer views than these do not tell constant frames from a wrong arm.
+MIN_VIEWS_FOR_FRAMES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ArmKinematics:
+    """An arm whose controller reports ``T_base_flange = T_base_root @ arm.forward(q) @ T_tip_flange``.
+
+    This is the `Kinematics` that estimates and plans take.
+
+    Parameters
+    ----------
+    arm
+        The description.
+    T_base_root
+        The root of the description in the base that the controller reports poses in.
+    T_tip_flange
+        The flange (or tool) whose pose the controller reports, in the tip of the description.
+    """
+
+    arm: Arm
+    T_base_root: Pose = field(default_factory=Pose.identity)
+    T_tip_flange: Pose = field(default_factory=Pose.identity)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, base first."""
+        return self.arm.joint_names
+
+    @property
+    def sliding(self) -> tuple[bool, ...]:
+        """Whether each joint slides."""
+        return self.arm.sliding
+
+    def forward(self, joints: FloatArray) -> FloatArray:
+        """(K, 4, 4) `T_base_flange` that the controller would report at joints (K, n)."""
+        return self.T_base_root.matrix @ self.arm.forward(joints) @ self.T_tip_flange.matrix
+
+    def motion_jacobians(self, mounting: Mounting, joints: FloatArray) -> FloatArray:
+        """(K, 6, n) D at joint positions (K, n), radians and metres: truly ``A = exp(D dq) A_reported``.
+
+        Eye in hand: A is the inverse of the robot's pose, so ``A(q + dq) = exp(-J dq) A(q)`` with the
+        Jacobian of the flange. Eye to hand: A is the pose itself, ``A(q + dq) = exp(J dq) A(q)`` with that of
+        the base.
+        """
+        if mounting is Mounting.EYE_IN_HAND:
+            return -(self.T_tip_flange.inverse().adjoint() @ self.arm.jacobian(joints, "flange"))
+        return self.T_base_root.adjoint() @ self.arm.jacobian(joints, "base")
+
+
+def arm_kinematics(arm: Arm, views: Sequence[View]) -> ArmKinematics:
+    """Return the kinematics of an arm in the frames that the poses of these views are reported in.
+
+    Views without joint positions are passed over here.
+
+    Raises
+    ------
+    InputError
+        No view has joint positions, one has another number of them than the arm has joints, or the reported
+        poses are not those of this arm.
+    """
+    known = [view for view in views if view.joints_rad is not None]
+    if not known:
+        raise InputError(
+            "no view has joint positions, which the arm's kinematics need",
+            code="no_joints",
+            hint="record the joint positions with every view, or leave the arm away",
+        )
+    for view in known:
+        if len(view.joints_rad or ()) != len(arm):
+            raise InputError(
+                f"view {view.name}: {len(view.joints_rad or ())} joint positions, but arm {arm.name} has "
+                f"{len(arm)}: {', '.join(arm.joint_names)}",
+                code="wrong_arm",
+            )
+    joints = np.array([view.joints_rad for view in known])
+    reported = np.array([view.T_base_flange.matrix for view in known])
+    kinematics = ArmKinematics(arm)
+    best = _disagreement(kinematics, joints, reported)
+    if not _agrees(best) and len(known) >= MIN_VIEWS_FOR_FRAMES:
+        try:
+            root, flange = _core.closed_form("shah", arm.forward(joints), reported)
+        except HandeyeError:
+            pass  # The views do not tell the frames; the message below says what is wrong.
+        else:
+            fitted = ArmKinematics(arm, Pose(root), Pose(flange))
+            off = _disagreement(fitted, joints, reported)
+            if _agrees(off):
+                return fitted
+            best = min(best, off)
+    if not _agrees(best):
+        raise InputError(
+            f"the reported poses are not those of arm {arm.name} at the reported joint positions: off by "
+            f"{best[0] * 1e3:.0f} mm and {np.rad2deg(best[1]):.1f} deg",
+            code="wrong_arm",
+            hint="check the arm, the order and the units (radians) of the joints, and which link is the tip",
+        )
+    return kinematics
+
+
+def _disagreement(kinematics: ArmKinematics, joints: FloatArray, reported: FloatArray) -> tuple[float, float]:
+    """Root mean square distance (m) and angle (rad) between reported poses and those of the arm."""
+    twists = _core.se3_log(np.linalg.inv(kinematics.forward(joints)) @ reported)
+    squares = np.mean(np.square(twists), axis=0)
+    return float(np.sqrt(squares[:3].sum())), float(np.sqrt(squares[3:].sum()))
+
+
+def _agrees(off: tuple[float, float]) -> bool:
+    return off[0] <= AGREEMENT_M and off[1] <= AGREEMENT_RAD

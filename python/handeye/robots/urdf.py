@@ -1,0 +1,365 @@
+"""Arms from URDF: the kinematic part of a robot description, from its base to one tip.
+
+Lengths are metres, angles radians, `rpy` are angles about the fixed axes x, y, z (http://wiki.ros.org/urdf/XML).
+Meshes, masses and controllers are not looked at.
+"""
+
+import math
+import os
+import re
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from handeye.errors import InputError
+from handeye.robots.model import Arm, Joint
+from handeye.robots.xml_tree import MAX_BYTES, Element, read_xml
+from handeye.types.pose import Pose
+
+MAX_LINKS = 10_000
+# Beyond these a number is in other units: no arm is so long, no joint turns so far.
+LONGEST_OFFSET_M = 50.0
+LARGEST_ANGLE_RAD = 4 * math.pi + 0.01
+LARGEST_TURN_RAD = 30.0
+# Preferred where several links could be the tip: names that end an arm in ROS-Industrial and at its makers.
+TIP_NAMES = ("tool0", "flange", "tcp", "ee_link", "tool", "link_ee")
+_MOVING = frozenset({"revolute", "continuous", "prismatic"})
+_KNOWN = _MOVING | {"fixed", "floating", "planar"}
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
+
+
+@dataclass(frozen=True)
+class _Edge:
+    """A joint of the description, moving or not."""
+
+    element: Element
+    name: str
+    kind: str
+    parent: str
+    child: str
+
+
+def read_urdf(path: str | os.PathLike[str], *, base: str | None = None, tip: str | None = None) -> Arm:
+    """Read an arm from a URDF file; see `parse_urdf`.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or used; the message names it and the place in it.
+    """
+    file = Path(path)
+    try:
+        if not stat.S_ISREG(file.stat().st_mode):
+            raise InputError(f"{file}: not a regular file", code="unreadable")
+        with file.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        code = "missing_file" if isinstance(error, FileNotFoundError) else "unreadable"
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError(f"{str(path)[:300]}: {reason or error}", code=code) from error
+    try:
+        return parse_urdf(content, base=base, tip=tip)
+    except InputError as error:
+        raise InputError(f"{file}: {error.message}", code=error.code, hint=error.hint) from error
+
+
+def parse_urdf(content: bytes, *, base: str | None = None, tip: str | None = None) -> Arm:
+    """Read an arm from a URDF document.
+
+    Parameters
+    ----------
+    content
+        The document.
+    base, tip
+        Links at the ends of the arm. By default the root of the tree, and the link with most moving joints
+        before it; where several have as many, the one whose name says that it is the flange.
+
+    Raises
+    ------
+    InputError
+        No well-formed XML or unsafe, no URDF, a link that is missing or has two parents, a circle, a number
+        that is none or in the wrong units, a joint on the way that cannot be used, or no clear tip.
+    """
+    root = read_xml(content)
+    if root.tag != "robot":
+        raise InputError(
+            f"line {root.line}: <{root.tag[:60]}>, expected <robot>",
+            code="not_urdf",
+            hint="give a robot description in URDF",
+        )
+    if b"${" in content or any(child.tag.startswith("xacro:") for child in root.children):
+        raise InputError(
+            "a xacro template, not a URDF",
+            code="not_urdf",
+            hint="expand it first: xacro robot.urdf.xacro > robot.urdf",
+        )
+    links = _links(root)
+    edges = _edges(root, links)
+    by_child = _tree(edges)
+    start = base if base is not None else _root(links, by_child)
+    if start not in links:
+        raise _no_link(start, links)
+    end = tip if tip is not None else _tip(links, by_child, start)
+    if end not in links:
+        raise _no_link(end, links)
+    path = _path(by_child, start, end)
+    return _arm(root.attributes.get("name", "arm")[:100] or "arm", path, start, end)
+
+
+def _links(root: Element) -> dict[str, Element]:
+    links: dict[str, Element] = {}
+    for element in root.all("link"):
+        name = _attribute(element, "name", "link")
+        if name in links:
+            raise _unusable(element, f"a second link {name!r}")
+        links[name] = element
+    if not links:
+        raise _unusable(root, "no <link>")
+    if len(links) > MAX_LINKS:
+        raise InputError(f"{len(links)} links, expected at most {MAX_LINKS}", code="too_large")
+    return links
+
+
+def _edges(root: Element, links: dict[str, Element]) -> list[_Edge]:
+    edges: list[_Edge] = []
+    names: set[str] = set()
+    for element in root.all("joint"):
+        name = _attribute(element, "name", "joint")
+        if name in names:
+            raise _unusable(element, f"a second joint {name!r}")
+        names.add(name)
+        kind = _attribute(element, "type", f"joint {name!r}")
+        if kind not in _KNOWN:
+            raise _unusable(
+                element, f"joint {name!r}: type {kind!r}, expected one of {', '.join(sorted(_KNOWN))}"
+            )
+        ends: list[str] = []
+        for role in ("parent", "child"):
+            end = element.one(role)
+            link = None if end is None else end.attributes.get("link")
+            if link is None:
+                raise _unusable(element, f"joint {name!r}: no <{role} link=...>")
+            if link not in links:
+                raise _unusable(element, f"joint {name!r}: {role} link {link[:100]!r} is not in the file")
+            ends.append(link)
+        edges.append(_Edge(element, name, kind, *ends))
+    return edges
+
+
+def _tree(edges: list[_Edge]) -> dict[str, _Edge]:
+    """Return the joint above each link that has one."""
+    by_child: dict[str, _Edge] = {}
+    for edge in edges:
+        if edge.child in by_child:
+            raise _unusable(
+                edge.element,
+                f"link {edge.child!r} hangs on two joints, {by_child[edge.child].name!r} and {edge.name!r}",
+            )
+        by_child[edge.child] = edge
+    clear: set[str] = set()
+    for link in by_child:
+        walked: set[str] = set()
+        at = link
+        while at in by_child and at not in clear:
+            if at in walked:
+                raise _unusable(by_child[at].element, f"the joints go round in a circle at link {at!r}")
+            walked.add(at)
+            at = by_child[at].parent
+        clear |= walked
+    return by_child
+
+
+def _root(links: dict[str, Element], by_child: dict[str, _Edge]) -> str:
+    roots = [name for name in links if name not in by_child]
+    # A link that nothing hangs on is no arm: loose links beside one are common in hand-written files.
+    parents = {edge.parent for edge in by_child.values()}
+    bearing = [name for name in roots if name in parents] or roots
+    if len(bearing) > 1:
+        raise InputError(
+            f"several links have no parent: {_names(bearing)}",
+            code="ambiguous_arm",
+            hint="say which one is the base of the arm",
+        )
+    return bearing[0]
+
+
+def _tip(links: dict[str, Element], by_child: dict[str, _Edge], base: str) -> str:
+    moving = _moving_before(links, by_child, base)
+    most = max(moving.values())
+    if most == 0:
+        raise InputError(f"no joint that moves hangs on {base!r}", code="unusable_arm")
+    last = [name for name, count in moving.items() if count == most]
+    named = [name for wanted in TIP_NAMES for name in last if name == wanted or name.endswith(f"_{wanted}")]
+    if named:
+        return named[0]
+    parents = {edge.parent for edge in by_child.values()}
+    leaves = [name for name in last if name not in parents]
+    if len(leaves) > 1:
+        raise InputError(
+            f"the arm could end in any of {_names(leaves)}",
+            code="ambiguous_arm",
+            hint="say which link is the flange whose pose the robot reports",
+        )
+    return leaves[0] if leaves else last[-1]
+
+
+def _moving_before(links: dict[str, Element], by_child: dict[str, _Edge], base: str) -> dict[str, int]:
+    """Return the number of moving joints between the base and each link that hangs on it."""
+    count: dict[str, int | None] = {base: 0}
+    for link in links:
+        path: list[_Edge] = []
+        at = link
+        while at not in count and at in by_child:
+            path.append(by_child[at])
+            at = by_child[at].parent
+        moving = count.setdefault(at, None)
+        for edge in reversed(path):
+            moving = None if moving is None else moving + (edge.kind in _MOVING)
+            count[edge.child] = moving
+    return {link: moving for link, moving in count.items() if moving is not None}
+
+
+def _upwards(by_child: dict[str, _Edge], base: str, tip: str) -> list[_Edge] | None:
+    """Return the joints from base to tip, None if the tip does not hang on the base."""
+    path: list[_Edge] = []
+    at = tip
+    while at != base:
+        edge = by_child.get(at)
+        if edge is None:
+            return None
+        path.append(edge)
+        at = edge.parent
+    return path[::-1]
+
+
+def _path(by_child: dict[str, _Edge], base: str, tip: str) -> list[_Edge]:
+    path = _upwards(by_child, base, tip)
+    if path is None:
+        raise InputError(
+            f"link {tip!r} does not hang on link {base!r}",
+            code="ambiguous_arm",
+            hint="name a base above the tip",
+        )
+    return path
+
+
+def _arm(name: str, path: list[_Edge], base: str, tip: str) -> Arm:
+    joints: list[Joint] = []
+    pending = Pose.identity()
+    for edge in path:
+        pending = pending @ _origin(edge)
+        if edge.kind == "fixed":
+            continue
+        if edge.kind not in _MOVING:
+            raise _unusable(edge.element, f"joint {edge.name!r} is {edge.kind}: an arm has none on its way")
+        if edge.element.one("mimic") is not None:
+            raise _unusable(edge.element, f"joint {edge.name!r} mimics another one")
+        joints.append(_joint(edge, pending))
+        pending = Pose.identity()
+    return Arm(name, tuple(joints), pending, base, tip)
+
+
+def _origin(edge: _Edge) -> Pose:
+    origin = edge.element.one("origin")
+    if origin is None:
+        return Pose.identity()
+    where = f"joint {edge.name!r}: origin"
+    xyz = _triple(origin, "xyz", where)
+    rpy = _triple(origin, "rpy", where)
+    if max(map(abs, xyz)) > LONGEST_OFFSET_M:
+        raise _unusable(
+            origin,
+            f"{where} xyz {xyz}: more than {LONGEST_OFFSET_M:g} m",
+            "URDF lengths are metres; divide millimetres by 1000",
+        )
+    if max(map(abs, rpy)) > LARGEST_ANGLE_RAD:
+        raise _unusable(
+            origin, f"{where} rpy {rpy}: more than two turns", "URDF angles are radians; convert degrees"
+        )
+    turns = [[0.0] * 3 + [angle if i == axis else 0.0 for i in range(3)] for axis, angle in enumerate(rpy)]
+    roll, pitch, yaw = (Pose.exp(turn) for turn in turns)
+    return Pose.exp([*xyz, 0, 0, 0]) @ yaw @ pitch @ roll
+
+
+def _joint(edge: _Edge, placement: Pose) -> Joint:
+    where = f"joint {edge.name!r}"
+    axis = (1.0, 0.0, 0.0)
+    element = edge.element.one("axis")
+    if element is not None:
+        axis = _triple(element, "xyz", f"{where}: axis")
+        if math.hypot(*axis) < 1e-6:
+            raise _unusable(element, f"{where}: axis {axis} has no direction")
+    norm = math.hypot(*axis)
+    unit = (axis[0] / norm, axis[1] / norm, axis[2] / norm)
+    lower, upper, velocity = _limits(edge, where)
+    return Joint(edge.name, placement, unit, edge.kind == "prismatic", lower, upper, velocity)
+
+
+def _limits(edge: _Edge, where: str) -> tuple[float, float, float]:
+    element = edge.element.one("limit")
+    if element is None:
+        if edge.kind == "continuous":
+            return -np.inf, np.inf, np.inf
+        raise _unusable(
+            edge.element,
+            f"{where}: {edge.kind} without <limit>",
+            "a joint without limits is of type continuous",
+        )
+    # Zero is URDF's default for both limits, and stands for unknown where a speed is meant.
+    lower, upper, velocity = (_number(element, name, where, 0.0) for name in ("lower", "upper", "velocity"))
+    if velocity < 0:
+        raise _unusable(element, f"{where}: a largest speed of {velocity:g}")
+    if edge.kind == "continuous":
+        return -np.inf, np.inf, velocity or np.inf
+    if lower > upper:
+        raise _unusable(element, f"{where}: limits {lower:g} to {upper:g} are not in order")
+    largest = LARGEST_TURN_RAD if edge.kind == "revolute" else LONGEST_OFFSET_M
+    if max(-lower, upper) > largest:
+        units = "angles are radians; convert degrees" if edge.kind == "revolute" else "lengths are metres"
+        raise _unusable(element, f"{where}: limits {lower:g} to {upper:g}", f"URDF {units}")
+    return lower, upper, velocity or np.inf
+
+
+def _attribute(element: Element, name: str, what: str) -> str:
+    value = element.attributes.get(name, "").strip()
+    if not value or len(value) > 300 or not value.isprintable():
+        raise _unusable(element, f"{what}: attribute {name!r} is missing, too long or not printable")
+    return value
+
+
+def _triple(element: Element, name: str, where: str) -> tuple[float, float, float]:
+    text = element.attributes.get(name, "0 0 0")
+    parts = text.split() if len(text) < 300 else []
+    if len(parts) != 3:
+        raise _unusable(element, f"{where} {name}={text[:60]!r}, expected three numbers")
+    x, y, z = (_spelled(element, part, f"{where} {name}") for part in parts)
+    return x, y, z
+
+
+def _number(element: Element, name: str, where: str, default: float) -> float:
+    text = element.attributes.get(name)
+    return default if text is None else _spelled(element, text.strip(), f"{where}: {name}")
+
+
+def _spelled(element: Element, text: str, where: str) -> float:
+    value = float(text) if len(text) < 60 and _NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(value):
+        raise _unusable(element, f"{where}: {text[:60]!r} is no finite number")
+    return value
+
+
+def _unusable(element: Element, what: str, hint: str | None = None) -> InputError:
+    return InputError(f"line {element.line}: {what}", code="unusable_urdf", hint=hint)
+
+
+def _no_link(name: str, links: dict[str, Element]) -> InputError:
+    return InputError(
+        f"no link {name[:100]!r}", code="unknown_link", hint=f"the links are {_names(list(links))}"
+    )
+
+
+def _names(names: list[str]) -> str:
+    shown = ", ".join(repr(name[:60]) for name in names[:12])
+    return shown + (", ..." if len(names) > 12 else "")
