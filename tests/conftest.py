@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from commands import Handeye
+
 # The same examples in every run; slow machines do not fail tests.
 settings.register_profile(
     "handeye",
@@ -50,3 +52,9 @@ def _needed(folder: Path) -> Path:
     if not folder.is_dir():
         pytest.skip(f"{folder} is missing (HANDEYE_DATA names {folder.parent})")
     return folder
+
+
+@pytest.fixture
+def handeye(capsys: pytest.CaptureFixture[str]) -> Handeye:
+    """The command line."""
+    return Handeye(capsys)

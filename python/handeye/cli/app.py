@@ -30,7 +30,7 @@ def make_app(named: str = "") -> App:
         help_format="markdown" if named else "plaintext",
         help_epilogue="handeye COMMAND --help explains a command. Exit codes: 0 good, 1 mistake in handeye, "
         "2 usage, 3 unusable input, 4 degenerate geometry, 5 failed detection, 6 not solved, "
-        "7 cannot write, 130 interrupted.",
+        "7 cannot write, 8 robot or camera failed, 130 interrupted.",
         version=version,
         default_parameter=Parameter(negative=()),
         result_action="return_value",

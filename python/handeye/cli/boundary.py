@@ -10,8 +10,8 @@ from typing import Any
 from cyclopts import CycloptsError
 
 from handeye.cli.answer import Answer, json_text
-from handeye.cli.app import make_app
-from handeye.cli.failures import UnexpectedError, UsageError
+from handeye.cli.app import COMMANDS, make_app
+from handeye.cli.failures import UnexpectedError, UsageError, WarnedError
 from handeye.errors import ExitCode, HandeyeError
 
 REPORT = (
@@ -32,14 +32,16 @@ def run(arguments: Sequence[str]) -> int:
         sys.stdout.flush()
         return ExitCode.SUCCESS
     except CycloptsError as error:
-        return _fail(_usage(error), as_json=as_json, debug=debug)
+        return _fail(_usage(error, options), as_json=as_json, debug=debug)
     except HandeyeError as error:
         return _fail(error, as_json=as_json, debug=debug)
+    except WarnedError as warned:
+        return _fail(warned.error, warned.warnings, as_json=as_json, debug=debug)
     except KeyboardInterrupt:
         _silence_stdout()
         _complain("interrupted")
         return ExitCode.INTERRUPTED
-    except BrokenPipeError:
+    except (BrokenPipeError, SystemExit):  # rich makes the second of the first
         _silence_stdout()  # whoever read has seen enough
         return ExitCode.OUTPUT
     except OSError as error:
@@ -52,7 +54,13 @@ def run(arguments: Sequence[str]) -> int:
         return _fail(_unexpected(error), as_json=as_json, debug=debug)
 
 
-def _usage(error: CycloptsError) -> HandeyeError:
+def _usage(error: CycloptsError, arguments: Sequence[str]) -> HandeyeError:
+    named = next((argument for argument in arguments if not argument.startswith("-")), None)
+    names = [name for name, _, _ in COMMANDS]
+    if named not in names:
+        # Said here: the library would load every command to say it.
+        message = "the command is missing" if named is None else f"no command {named!r}"
+        return UsageError(message, hint=f"there are {', '.join(names)}; handeye --help says more")
     chain = " ".join(["handeye", *(error.command_chain or ())])
     message = " ".join(str(error).split())
     return UsageError(message, hint=f"{chain} --help says what can be asked").with_traceback(
@@ -74,7 +82,7 @@ def _print(answer: Answer, *, as_json: bool) -> None:
     answer.show(Console(highlight=False))
 
 
-def _fail(error: HandeyeError, *, as_json: bool, debug: bool) -> int:
+def _fail(error: HandeyeError, warnings: tuple[str, ...] = (), *, as_json: bool, debug: bool) -> int:
     if as_json:
         described = {
             "code": error.code,
@@ -83,12 +91,14 @@ def _fail(error: HandeyeError, *, as_json: bool, debug: bool) -> int:
             "exit_code": int(error.exit_code),
         }
         try:
-            sys.stdout.write(json_text({"error": described}))
+            sys.stdout.write(json_text({"error": described, "warnings": warnings}))
             sys.stdout.flush()
         except OSError:
             _silence_stdout()
     if debug:
         _complain("".join(traceback.format_exception(error.__cause__ or error)).rstrip())
+    for warning in warnings:
+        _complain(f"warning: {warning}")
     _complain(f"error: {error.message}")
     if error.hint is not None:
         _complain(f"hint: {error.hint}")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from handeye.cli.answer import Answer
 from handeye.cli.options import Common
-from handeye.cli.output import check_output, write_figure
+from handeye.cli.output import check_picture, write_figure
 from handeye.cli.progress import progress
 from handeye.datasets import read_recording
 from handeye.datasets.shipped import shipped_recording
@@ -49,7 +49,7 @@ def demo(
     seed
         Seed of the starts.
     """
-    check_output(picture)
+    check_picture(picture)
     recording = read_recording(shipped_recording()).recording
     workers = max(1, min(os.cpu_count() or 1, starts // STARTS_PER_WORKER))
     with progress("Replaying from random starts") as advance:

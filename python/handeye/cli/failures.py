@@ -3,6 +3,15 @@
 from handeye.errors import ExitCode, HandeyeError
 
 
+class WarnedError(Exception):
+    """An error after warnings about the data, which may well name its cause."""
+
+    def __init__(self, error: HandeyeError, warnings: tuple[str, ...]) -> None:
+        super().__init__(error.message)
+        self.error = error
+        self.warnings = warnings
+
+
 class UsageError(HandeyeError):
     """The command line is not understood, or asks for what does not go together."""
 

@@ -28,6 +28,25 @@ def check_output(path: Path | None) -> None:
         raise OutputError(f"{path}: the folder {path.parent} does not exist", hint="create it first")
 
 
+def check_picture(path: Path) -> None:
+    """Refuse a picture that cannot be written, before the work rather than after it.
+
+    Raises
+    ------
+    OutputError
+        As `check_output`, or a format that is none of png, svg and pdf.
+    """
+    check_output(path)
+    _picture_kind(path)
+
+
+def _picture_kind(path: Path) -> str:
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in {"png", "svg", "pdf"}:
+        raise OutputError(f"{path}: no picture format, expected .png, .svg or .pdf", code="unknown_format")
+    return kind
+
+
 def check_new_folder(path: Path) -> None:
     """Refuse a folder that is there already or cannot be made, before the work rather than after it.
 
@@ -65,9 +84,6 @@ def write_figure(path: Path, figure: "Figure") -> None:
     """
     from io import BytesIO  # noqa: PLC0415 - pictures are rare
 
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in {"png", "svg", "pdf"}:
-        raise OutputError(f"{path}: no picture format, expected .png, .svg or .pdf", code="unknown_format")
     content = BytesIO()
-    figure.savefig(content, format=kind)  # pyright: ignore[reportUnknownMemberType]
+    figure.savefig(content, format=_picture_kind(path))  # pyright: ignore[reportUnknownMemberType]
     replace_file(path, content.getvalue())

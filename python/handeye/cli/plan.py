@@ -1,6 +1,6 @@
 """`handeye plan`: which view to take next, from those recorded or from poses in a file."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,11 +13,12 @@ from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
-from handeye.cli.source import Source
+from handeye.cli.source import Source, mindful_of
 from handeye.datasets import read_poses_csv
 from handeye.errors import InputError
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
 from handeye.solving import Estimate, Measurements, Sight, make_estimator
+from handeye.solving.initialize import check_views
 from handeye.types.calibration import MM_PER_M, ModelName
 
 if TYPE_CHECKING:
@@ -108,6 +109,7 @@ def plan(
     table = None if candidates is None else read_poses_csv(candidates)
     opened = source.open(folder)
     measurements = Measurements.of_recording(opened.recording)
+    check_views(measurements)
     taken = _taken(measurements, used, first, with_file=table is not None)
     if table is None:
         left = [view for view in measurements.views if view.name not in taken]
@@ -118,14 +120,17 @@ def plan(
         sight = Sight(margin_px=margin_px, fewest=fewest)
     names = [view.name for view in measurements.views]
     options = PlannerOptions(criterion=worth, sight=sight)
-    planner = Planner(
-        measurements.select([names.index(name) for name in taken]), pool, make_estimator(model), options
-    )
-    ranking = rank(planner.estimate, planner.pool, options.criterion, sight, gains=planner.gains(), top=top)
     warnings = (*opened.warnings, *(() if table is None else table.warnings))
+    with mindful_of(warnings):
+        start = measurements.select([names.index(name) for name in taken])
+        planner = Planner(start, pool, make_estimator(model), options)
+        ranking = rank(planner.estimate, planner.pool, worth, sight, gains=planner.gains(), top=top)
+    # The planner leaves out what is taken; a person may wonder where it is.
+    again = {name: "a view of this name is taken already" for name in taken if name in _names(pool)}
+    ranking = replace(ranking, infeasible=ranking.infeasible | again)
     found = _Plan(
         opened.recording.name,
-        options.criterion.name,
+        worth.name,
         taken,
         tuple(str(warning) for warning in warnings),
         planner.estimate,
@@ -135,6 +140,10 @@ def plan(
     if output is not None:
         write_json(output, data)
     return Answer(data, lambda console: _show(console, found, top or SHOWN))
+
+
+def _names(pool: Pool) -> set[str]:
+    return {candidate.name for candidate in pool.candidates}
 
 
 def _criterion(name: Criterion, tool_point_mm: tuple[float, float, float] | None) -> _core.Criterion:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from handeye.cli.answer import Answer
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
-from handeye.cli.source import Source
+from handeye.cli.source import Source, mindful_of
 from handeye.evaluation.region import Ellipsoid, position_region
 from handeye.importing import Opened
 from handeye.solving import solve as solve_recording
@@ -45,7 +45,8 @@ def solve(
     """
     check_output(output)
     opened = source.open(folder)
-    calibration = solve_recording(opened.recording, model, reduced=reduced)
+    with mindful_of(opened.warnings):
+        calibration = solve_recording(opened.recording, model, reduced=reduced)
     region = position_region(calibration)
     data = _data(opened, calibration, region)
     if output is not None:

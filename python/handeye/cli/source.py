@@ -1,14 +1,17 @@
 """The options that say how to read a folder, for every command that takes one."""
 
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from handeye.cli.failures import UsageError
+from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
-from handeye.datasets import read_camera, read_target
+from handeye.datasets import DataWarning, read_camera, read_target
+from handeye.errors import HandeyeError
 from handeye.importing import Opened, SourceOptions, open_folder
 from handeye.types import Chessboard, Mounting, Target
 
@@ -75,3 +78,18 @@ class Source:
         options = self.options()
         with progress("Looking for the target in the images") as advance:
             return open_folder(folder, options, progress=advance)
+
+
+@contextmanager
+def mindful_of(warnings: Iterable[DataWarning]) -> Generator[None]:
+    """Keep what looks wrong with the data beside an error: it may well be the cause.
+
+    Raises
+    ------
+    WarnedError
+        Whatever of ours is raised inside.
+    """
+    try:
+        yield
+    except HandeyeError as error:
+        raise WarnedError(error, tuple(map(str, warnings))) from error

@@ -12,7 +12,7 @@ from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.progress import progress
-from handeye.cli.source import Source
+from handeye.cli.source import Source, mindful_of
 from handeye.evaluation.validation import ModelCheck, Validation
 from handeye.evaluation.validation import validate as validate_recording
 from handeye.types.calibration import ModelName
@@ -60,7 +60,7 @@ def validate(
     check_output(output)
     opened = source.open(folder)
     workers = max(1, min(os.cpu_count() or 1, splits // SPLITS_PER_WORKER))
-    with progress("Splitting the views") as advance:
+    with progress("Splitting the views") as advance, mindful_of(opened.warnings):
         found = validate_recording(
             opened.recording, model, splits=splits, seed=seed, workers=workers, progress=advance
         )

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from handeye.errors import DegenerateError, HandeyeError, InputError
+from handeye.errors import HandeyeError, InputError
 from handeye.evaluation import metrics
 from handeye.evaluation.comparison import summary
 from handeye.evaluation.parallel import Progress, part_of, run_all
 from handeye.evaluation.validation_findings import findings
-from handeye.solving import Estimate, Measurements, make_estimator
+from handeye.solving import Estimate, Measurements, make_estimator, require_determined
 from handeye.types import Recording
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import MM_PER_M, Finding, ModelName
@@ -250,10 +250,7 @@ def _check(
     progress: Progress | None,
 ) -> ModelCheck:
     estimate = make_estimator(model)(measurements)
-    if not estimate.determined:
-        raise DegenerateError(
-            f"{recording.name}: {estimate.unobservable[0].sentence}", hint=estimate.unobservable[0].cure
-        )
+    require_determined(estimate)
     count = len(measurements)
     contiguous = _parts(range(count), count // 2)
     total = len(halvings) + len(thirds) + 1

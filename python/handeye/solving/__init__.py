@@ -1,7 +1,7 @@
 """From views to X and Y with their uncertainty."""
 
 from handeye.solving.auto import AutoEstimator, AutoOptions
-from handeye.solving.calibrate import calibrate, make_estimator, solve, to_calibration
+from handeye.solving.calibrate import calibrate, make_estimator, require_determined, solve, to_calibration
 from handeye.solving.estimate import Estimate, Estimator, Sight
 from handeye.solving.measurements import Measurements, ViewPose, view_pose
 from handeye.solving.paper import paper_estimate
@@ -17,6 +17,7 @@ __all__ = [
     "calibrate",
     "make_estimator",
     "paper_estimate",
+    "require_determined",
     "solve",
     "to_calibration",
     "view_pose",

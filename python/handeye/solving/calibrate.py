@@ -53,13 +53,25 @@ def calibrate(
     """Calibrate from measurements; see `solve`."""
     check_views(measurements)
     estimate = make_estimator(model)(measurements)
-    if not estimate.determined and not reduced:
-        sentences = list(dict.fromkeys(direction.sentence for direction in estimate.unobservable))
-        raise DegenerateError("; ".join(sentences), hint=estimate.unobservable[0].cure)
+    if not reduced:
+        require_determined(estimate)
     calibration = to_calibration(measurements, estimate)
     if calibration.model is ModelName.PAPER or not estimate.determined:
         return calibration
     return replace(calibration, diagnosis=(*calibration.diagnosis, blame(measurements, estimate)))
+
+
+def require_determined(estimate: Estimate) -> None:
+    """Raise where the views leave something open.
+
+    Raises
+    ------
+    DegenerateError
+        The message names what is open, the hint how to cure it.
+    """
+    if not estimate.determined:
+        sentences = list(dict.fromkeys(direction.sentence for direction in estimate.unobservable))
+        raise DegenerateError("; ".join(sentences), hint=estimate.unobservable[0].cure)
 
 
 def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibration:
