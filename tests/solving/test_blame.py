@@ -59,6 +59,29 @@ class TestBlame:
         assert finding.code == "blame_camera"
         assert "fx -6" in finding.sentence or "fx -5" in finding.sentence
 
+    @pytest.mark.parametrize("lag_s", [0.02, -0.03])
+    def test_the_clocks(self, mounting: Mounting, lag_s: float) -> None:
+        """The arm passes three places without stopping, and the images are taken later than the poses."""
+        cell = Cell(np.random.default_rng(5), mounting)
+        stations = [cell.robot_pose(cell.look()) for _ in range(4)]
+
+        def passing(time_s: float) -> Pose:
+            leg, share = int(time_s), time_s % 1
+            start, end = stations[leg], stations[leg + 1]
+            return start @ Pose.exp((start.inverse() @ end).log() * (3 * share**2 - 2 * share**3))
+
+        views: list[View] = []
+        for time_s in np.linspace(0.05, 2.9, 40).tolist():
+            seen = cell.view(f"view_{time_s:.2f}", passing(time_s + lag_s), sigma_px=0.1)
+            views.append(View(seen.name, passing(time_s), seen.point_ids, seen.pixels, timestamp_s=time_s))
+        measurements = Measurements.of(mounting, cell.camera, cell.target, views)
+        finding = blame(measurements, AutoEstimator()(measurements))
+        assert finding.code == "blame_time_lag"
+        assert ("later" if lag_s > 0 else "earlier") in finding.sentence
+        found = re.search(r"([0-9.]+) ms", finding.sentence)
+        assert found is not None
+        assert float(found[1]) == pytest.approx(abs(lag_s) * 1e3, rel=0.1)
+
 
 def replace_parameters(camera: Camera, parameters: FloatArray) -> Camera:
     return Camera(camera.lens, parameters, camera.width_px, camera.height_px, camera.covariance)

@@ -16,6 +16,7 @@ from handeye.solving.estimate import Estimate, side_of_chain
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Finding, RobotSide
+from handeye.types.mounting import Mounting
 
 # Beyond what its calibration claims, as a factor on the camera's deviations: what blame it could bear.
 CAMERA_BLAME_INFLATION = 10.0
@@ -23,6 +24,10 @@ CAMERA_BLAME_INFLATION = 10.0
 BOARD_SCALE_SIGMA = 0.01
 # Logarithm of a Bayes factor that counts as decisive (Kass and Raftery 1995: "very strong" is 5).
 DECISIVE = 5.0
+# Deviation of a lag between clocks.
+TIME_LAG_SIGMA_S = 0.1
+# Slower than this a lag shows nothing.
+SLOWEST_M_S = 1e-3
 # A cause is named if it leaves less than this share of the robot noise.
 CONVINCING_SHARE = 0.7
 # Focal lengths and principal point come first.
@@ -89,7 +94,36 @@ def suspects(measurements: Measurements, estimate: Estimate) -> tuple[Suspect, .
     words = f"it seems {abs(percent):.2g} % {size} than stated"
     left = _robot_noise(posterior) / noise
     found.append(Suspect("board_scale", "the size of the board", evidence - fixed, words, left))
+    lag = time_lag_jacobians(measurements)
+    if lag is not None:
+        errors = _core.JointErrors(lag, [1.0], [0], offset_rad=TIME_LAG_SIGMA_S)
+        nothing = CameraPrior((), np.zeros((0, 0)))
+        evidence, posterior = _evidence(measurements, estimate, nothing, joints=errors)
+        milliseconds = 1e3 * float(posterior.joint_offsets[0])
+        words = f"the images seem {abs(milliseconds):.2g} ms {'later' if milliseconds > 0 else 'earlier'} than the poses"
+        left = _robot_noise(posterior) / noise
+        found.append(Suspect("time_lag", "a lag between poses and images", evidence - fixed, words, left))
     return tuple(found)
+
+
+def time_lag_jacobians(measurements: Measurements) -> FloatArray | None:
+    """(K, 6, 1) derivative of the motions, on the left, in a time by which images are later than poses.
+
+    Velocities are differences between neighbouring views; None without timestamps on all views, or where the
+    robot hardly moves between them.
+    """
+    times = np.array([np.nan if v.timestamp_s is None else v.timestamp_s for v in measurements.views])
+    if np.isnan(times).any() or np.any(np.diff(times) <= 0):
+        return None
+    poses = np.array([view.T_base_flange.matrix for view in measurements.views])
+    before, after = poses[:-2], poses[2:]
+    twists = _core.se3_log(np.linalg.inv(before) @ after) / (times[2:] - times[:-2])[:, None]
+    velocities = np.concatenate([twists[:1], twists, twists[-1:]])
+    if np.median(np.linalg.norm(velocities[:, :3], axis=1)) < SLOWEST_M_S:
+        return None
+    if measurements.mounting is Mounting.EYE_IN_HAND:
+        return -velocities[:, :, None]
+    return _core.se3_adjoint(poses) @ velocities[:, :, None]
 
 
 def blame(measurements: Measurements, estimate: Estimate) -> Finding:
@@ -137,6 +171,7 @@ def _evidence(
     *,
     sides: list[str] | None = None,
     board_scale: bool = False,
+    joints: _core.JointErrors | None = None,
 ) -> tuple[float, _core.Posterior]:
     """Return the logarithm of the evidence of one hypothesis, and its posterior.
 
@@ -154,6 +189,7 @@ def _evidence(
         start=(estimate.X.matrix, estimate.Y.matrix),
         exact_probability=_EXACT_PROBABILITY[None if sides is None else len(sides)],
         sides=sides,
+        joints=joints,
         linearisations=10,
     )
     # The prior's own normalisation, which the sum over hypotheses leaves out.
