@@ -100,7 +100,8 @@ def suspects(measurements: Measurements, estimate: Estimate) -> tuple[Suspect, .
         nothing = CameraPrior((), np.zeros((0, 0)))
         evidence, posterior = _evidence(measurements, estimate, nothing, joints=errors)
         milliseconds = 1e3 * float(posterior.joint_offsets[0])
-        words = f"the images seem {abs(milliseconds):.2g} ms {'later' if milliseconds > 0 else 'earlier'} than the poses"
+        order = "later" if milliseconds > 0 else "earlier"
+        words = f"the images seem {abs(milliseconds):.2g} ms {order} than the poses"
         left = _robot_noise(posterior) / noise
         found.append(Suspect("time_lag", "a lag between poses and images", evidence - fixed, words, left))
     return tuple(found)
