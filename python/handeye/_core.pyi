@@ -238,7 +238,11 @@ class Criterion:
     def name(self) -> str: ...
 
 class Predictor:
-    """Predicts what candidate views would tell, at motions A (N, 4, 4)."""
+    """Predicts what candidate views would tell, at motions A (N, 4, 4).
+
+    `free_joints`: joints whose offset is a parameter; `joint_noise` (n,): standard deviation of each joint, in place
+    of `robot_root` wherever `jacobians` (N, 6, n) of the candidates are given: truly `exp(jacobians[i] dq) @ A`.
+    """
 
     def __init__(
         self,
@@ -254,14 +258,28 @@ class Predictor:
         robot_root: ArrayLike | None = None,
         free_camera: list[int] | None = None,
         board_scale: bool = False,
+        free_joints: list[int] | None = None,
+        joint_noise: list[float] | None = None,
         image_size: tuple[float, float] | None = None,
         margin_px: float = 0.0,
         fewest: int = 3,
     ) -> None: ...
-    def gains(self, belief: Belief, criterion: Criterion, motions: ArrayLike) -> NDArray[float64]:
-        """Gain (N,) of each candidate; NaN where too little of the target would be in sight."""
+    def gains(
+        self,
+        belief: Belief,
+        criterion: Criterion,
+        motions: ArrayLike,
+        *,
+        jacobians: ArrayLike | None = None,
+        threads: int = 0,
+        vector_unit: str | None = None,
+    ) -> NDArray[float64]:
+        """Gain (N,) of each candidate; NaN where too little of the target would be in sight.
 
-    def informations(self, motions: ArrayLike) -> NDArray[float64]:
+        `threads` (0: as many as pay off) and `vector_unit` change nothing beyond rounding.
+        """
+
+    def informations(self, motions: ArrayLike, *, jacobians: ArrayLike | None = None) -> NDArray[float64]:
         """Information (N, n, n) of each candidate; zero where too little would be in sight."""
 
 # Evidence

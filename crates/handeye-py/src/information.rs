@@ -4,7 +4,9 @@ use handeye_core::error::Error;
 use handeye_core::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, ToolPoint, Trace,
 };
-use handeye_core::information::{Belief as CoreBelief, CandidateModel, Execution, Motions, Sight};
+use handeye_core::information::{
+    Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, Sight,
+};
 use handeye_core::least_squares::PixelParameters;
 use handeye_core::simd::VectorUnit;
 use nalgebra::DMatrix;
@@ -14,7 +16,7 @@ use pyo3::prelude::*;
 use crate::camera::{camera, features};
 use crate::convert::{self, Array};
 use crate::errors::{invalid, to_python};
-use crate::model::{side, square};
+use crate::model::{jacobian_list, side, square};
 
 /// Registers the classes of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -148,10 +150,32 @@ pub struct Predictor {
     pixel_sigma: f64,
     robot: Option<(handeye_core::least_squares::Side, nalgebra::Matrix6<f64>)>,
     pixel_parameters: Option<PixelParameters>,
+    free_joints: Vec<usize>,
+    joint_noise: Option<Vec<f64>>,
     sight: Sight,
 }
 
 impl Predictor {
+    /// What the joints of each candidate do, out of `(N, 6, n)`.
+    fn joints(
+        &self,
+        py: Python<'_>,
+        jacobians: Option<Array<'_>>,
+        count: usize,
+    ) -> PyResult<Option<Vec<CandidateJoints>>> {
+        let Some(jacobians) = jacobians else { return Ok(None) };
+        let jacobians = jacobian_list(py, &jacobians)?;
+        let noise = self.joint_noise.as_deref();
+        let fits = jacobians.len() == count
+            && jacobians.iter().all(|d| {
+                self.free_joints.iter().all(|i| *i < d.ncols()) && noise.is_none_or(|n| n.len() == d.ncols())
+            });
+        if !fits {
+            return Err(invalid(py, "joint Jacobians: as many as motions, with a column for every joint"));
+        }
+        Ok(Some(jacobians.iter().map(|d| CandidateJoints::new(d, &self.free_joints, noise)).collect()))
+    }
+
     fn model(&self) -> CandidateModel<'_> {
         CandidateModel {
             camera: &self.camera,
@@ -161,7 +185,7 @@ impl Predictor {
             pixel_sigma: self.pixel_sigma,
             robot: self.robot,
             pixel_parameters: self.pixel_parameters.as_ref(),
-            kinematic_count: 0,
+            kinematic_count: self.free_joints.len(),
             sight: self.sight,
         }
     }
@@ -172,7 +196,8 @@ impl Predictor {
     #[new]
     #[pyo3(signature = (
         lens, parameters, points, radii, x, y, *, pixel_sigma, robot_side=None, robot_root=None,
-        free_camera=None, board_scale=false, image_size=None, margin_px=0.0, fewest=3,
+        free_camera=None, board_scale=false, free_joints=None, joint_noise=None, image_size=None, margin_px=0.0,
+        fewest=3,
     ))]
     #[expect(clippy::too_many_arguments, reason = "one keyword per assumption")]
     fn new<'py>(
@@ -188,6 +213,8 @@ impl Predictor {
         robot_root: Option<Array<'py>>,
         free_camera: Option<Vec<usize>>,
         board_scale: bool,
+        free_joints: Option<Vec<usize>>,
+        joint_noise: Option<Vec<f64>>,
         image_size: Option<(f64, f64)>,
         margin_px: f64,
         fewest: usize,
@@ -217,6 +244,8 @@ impl Predictor {
             pixel_sigma,
             robot,
             pixel_parameters,
+            free_joints: free_joints.unwrap_or_default(),
+            joint_noise,
             sight: Sight { image: image_size.map(|(w, h)| [w, h]), margin_px, fewest },
         })
     }
@@ -224,16 +253,27 @@ impl Predictor {
     /// Gain of each candidate motion; NaN where too little would be in sight.
     ///
     /// Results do not depend on `threads` (0: as many as pay off) and on `vector_unit` beyond rounding.
-    #[pyo3(signature = (belief, criterion, motions, *, threads=0, vector_unit=None))]
+    #[pyo3(signature = (belief, criterion, motions, *, jacobians=None, threads=0, vector_unit=None))]
+    #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
     fn gains<'py>(
         &self,
         py: Python<'py>,
         belief: &Belief,
         criterion: &PyCriterion,
         motions: Array<'py>,
+        jacobians: Option<Array<'py>>,
         threads: usize,
         vector_unit: Option<&str>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        if jacobians.is_some() {
+            let motions = convert::transforms(py, "motions", &motions)?;
+            let joints = self.joints(py, jacobians, motions.len())?.unwrap_or_default();
+            let criterion = criterion.inner.as_ref();
+            let gains = py
+                .detach(|| self.model().gains_with_joints(&belief.inner, criterion, &motions, &joints))
+                .map_err(|e| to_python(py, e))?;
+            return Ok(convert::scalars_out(py, gains));
+        }
         let unit =
             vector_unit.map_or_else(|| Ok(VectorUnit::widest()), |name| self::vector_unit(py, name))?;
         let matrices = convert::row_major::<4, 4>(py, "motions", &motions)?;
@@ -255,20 +295,24 @@ impl Predictor {
     }
 
     /// Information `(N, n, n)` of each candidate motion; zero where too little would be in sight.
+    #[pyo3(signature = (motions, *, jacobians=None))]
     fn informations<'py>(
         &self,
         py: Python<'py>,
         motions: Array<'py>,
+        jacobians: Option<Array<'py>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let motions = convert::transforms(py, "motions", &motions)?;
+        let joints = self.joints(py, jacobians, motions.len())?;
         let model = self.model();
         let n = model.parameter_count();
         let all: Vec<DMatrix<f64>> = py.detach(|| {
             motions
                 .iter()
-                .map(|motion| {
+                .enumerate()
+                .map(|(i, motion)| {
                     model
-                        .candidate(motion, None)
+                        .candidate(motion, joints.as_ref().map(|j| &j[i]))
                         .map_or_else(|| DMatrix::zeros(n, n), |c| &c.factor * c.factor.transpose())
                 })
                 .collect()

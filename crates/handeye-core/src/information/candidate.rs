@@ -54,6 +54,30 @@ pub struct Candidate {
     pub seen: usize,
 }
 
+/// How errors of the joints move one candidate, where the arm's kinematics are known: `A <- exp(D dq) A`.
+#[derive(Clone, Debug)]
+pub struct CandidateJoints {
+    /// Columns of `D` for the offsets that are parameters, `6 x kinematic_count`.
+    pub offsets: DMatrix<f64>,
+    /// Square root of the covariance that noise of the joints gives `A` on its left; takes the place of the model's
+    /// robot error.
+    pub noise_root: Option<Matrix6<f64>>,
+}
+
+impl CandidateJoints {
+    /// From `D` of all joints, `6 x n`: which offsets are free, and the standard deviation of each joint's noise.
+    pub fn new(jacobian: &DMatrix<f64>, free: &[usize], noise: Option<&[f64]>) -> Self {
+        let noise_root = noise.map(|sigmas| {
+            let mut covariance = DMatrix::zeros(6, 6);
+            for (column, sigma) in jacobian.column_iter().zip(sigmas) {
+                covariance += column * column.transpose() * (sigma * sigma);
+            }
+            Matrix6::from_column_slice(semidefinite_root(covariance).as_slice())
+        });
+        Self { offsets: jacobian.select_columns(free), noise_root }
+    }
+}
+
 impl CandidateModel<'_> {
     /// Number of global parameters of the belief it goes with.
     pub fn parameter_count(&self) -> usize {
@@ -61,7 +85,7 @@ impl CandidateModel<'_> {
     }
 
     /// The quadratic at the predicted pose, robot error marginalised; `None` if too little is in sight.
-    fn block(&self, motion: &Se3) -> Option<(ViewBlock, usize)> {
+    fn block(&self, motion: &Se3, joints: Option<&CandidateJoints>) -> Option<(ViewBlock, usize)> {
         let pose = self.x * *motion * self.y;
         let information = 1.0 / (self.pixel_sigma * self.pixel_sigma);
         let nothing = Vector2::zeros();
@@ -92,7 +116,8 @@ impl CandidateModel<'_> {
         }
         let (m, g) = moments.finish();
         let block = ViewBlock { m, g, columns: columns.map(|c| c.1), cost: 0.0, squared_px: 0.0 };
-        let Some((side, root)) = &self.robot else { return Some((block, seen)) };
+        let of_joints = joints.and_then(|j| j.noise_root).map(|root| (Side::Left, root));
+        let Some((side, root)) = &of_joints.or(self.robot) else { return Some((block, seen)) };
         let before = match side {
             Side::Left => self.x,
             Side::Right => self.x * *motion,
@@ -114,17 +139,18 @@ impl CandidateModel<'_> {
         }
     }
 
-    /// The candidate at robot motion `A`, with the kinematic Jacobian `D` if the model has kinematic parameters.
-    pub fn candidate(&self, motion: &Se3, kinematic: Option<&DMatrix<f64>>) -> Option<Candidate> {
-        let (block, seen) = self.block(motion)?;
+    /// The candidate at robot motion `A`. Without `joints` its kinematic parameters, if there are any, move nothing.
+    pub fn candidate(&self, motion: &Se3, joints: Option<&CandidateJoints>) -> Option<Candidate> {
+        let (block, seen) = self.block(motion, joints)?;
         let extra = block.columns.as_ref().map_or(0, |c| c.gc.len());
         let n = self.parameter_count();
         let mut map = DMatrix::zeros(6 + extra, n);
         map.view_mut((0, 0), (6, 6)).fill_with_identity();
         map.view_mut((0, 6), (6, 6)).copy_from(&(self.x * *motion).adjoint());
         map.view_mut((6, CHAIN), (extra, extra)).fill_with_identity();
-        if let Some(jacobian) = kinematic {
-            map.view_mut((0, CHAIN + extra), jacobian.shape()).copy_from(&(self.x.adjoint() * jacobian));
+        if let Some(joints) = joints {
+            let columns = self.x.adjoint() * &joints.offsets;
+            map.view_mut((0, CHAIN + extra), columns.shape()).copy_from(&columns);
         }
         let factor = map.tr_mul(&semidefinite_root(block.matrix()));
         Some(Candidate { factor, seen })
@@ -169,13 +195,7 @@ impl CandidateModel<'_> {
         motions: Motions<'_>,
         execution: &Execution,
     ) -> Result<Vec<f64>, Error> {
-        if belief.len() != self.parameter_count() {
-            return Err(Error::invalid(format!(
-                "the belief has {} parameters, the candidates {}",
-                belief.len(),
-                self.parameter_count()
-            )));
-        }
+        self.check(belief)?;
         let mut gains = vec![f64::NAN; motions.len()];
         if let Some(of) = criterion.entropy_of().filter(|_| belief.len() == CHAIN) {
             Scorer::new(self, belief, of, execution.unit)?.score(motions, execution, &mut gains)?;
@@ -188,6 +208,44 @@ impl CandidateModel<'_> {
             }
         }
         Ok(gains)
+    }
+
+    /// As [`CandidateModel::gains`], of an arm whose joints err: one [`CandidateJoints`] per motion.
+    ///
+    /// # Errors
+    /// As [`CandidateModel::gains`], and if there are not as many or not with as many offsets.
+    pub fn gains_with_joints(
+        &self,
+        belief: &Belief,
+        criterion: &dyn Criterion,
+        motions: &[Se3],
+        joints: &[CandidateJoints],
+    ) -> Result<Vec<f64>, Error> {
+        self.check(belief)?;
+        if joints.len() != motions.len() || joints.iter().any(|j| j.offsets.ncols() != self.kinematic_count) {
+            return Err(Error::invalid(format!(
+                "expected joints of {} motions with {} free offsets each",
+                motions.len(),
+                self.kinematic_count
+            )));
+        }
+        let prepared = criterion.prepare(belief)?;
+        let gain = |(motion, joints)| {
+            self.candidate(motion, Some(joints))
+                .map_or(f64::NAN, |candidate| prepared.gain(&candidate.factor))
+        };
+        Ok(motions.iter().zip(joints).map(gain).collect())
+    }
+
+    fn check(&self, belief: &Belief) -> Result<(), Error> {
+        if belief.len() == self.parameter_count() {
+            return Ok(());
+        }
+        Err(Error::invalid(format!(
+            "the belief has {} parameters, the candidates {}",
+            belief.len(),
+            self.parameter_count()
+        )))
     }
 }
 

@@ -9,4 +9,4 @@ pub mod criteria;
 mod scorer;
 
 pub use belief::{Belief, entropy};
-pub use candidate::{Candidate, CandidateModel, Execution, Motions, Sight};
+pub use candidate::{Candidate, CandidateJoints, CandidateModel, Execution, Motions, Sight};
