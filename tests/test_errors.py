@@ -15,6 +15,7 @@ def test_every_error_has_its_own_exit_code_and_word() -> None:
         ("DetectionError", 5),
         ("SolveError", 6),
         ("OutputError", 7),
+        ("DeviceError", 8),
     }
     assert len({e.default_code for e in family}) == len(family)
 

@@ -19,6 +19,7 @@ class ExitCode(IntEnum):
     DETECTION = 5
     SOLVE = 6
     OUTPUT = 7
+    DEVICE = 8
     INTERRUPTED = 130
 
 
@@ -82,3 +83,10 @@ class OutputError(HandeyeError):
 
     exit_code = ExitCode.OUTPUT
     default_code = "not_written"
+
+
+class DeviceError(HandeyeError):
+    """A robot or a camera did not do what it was asked."""
+
+    exit_code = ExitCode.DEVICE
+    default_code = "device_failed"

@@ -1,0 +1,60 @@
+"""Cameras that OpenCV can open: USB cameras, network streams."""
+
+import time
+
+import cv2
+import numpy as np
+
+from handeye.cameras.protocol import Frame
+from handeye.errors import DeviceError
+
+# Drivers keep old pictures in a queue; so many are thrown away before one is believed to be of now.
+STALE_FRAMES = 5
+
+
+class Capture:
+    """A camera that OpenCV opens.
+
+    Parameters
+    ----------
+    source
+        Number of the device, or the address of a stream.
+    size_px
+        Width and height to ask for; None to take what comes.
+
+    Raises
+    ------
+    DeviceError
+        It cannot be opened.
+    """
+
+    def __init__(self, source: int | str, *, size_px: tuple[int, int] | None = None) -> None:
+        self._source = source
+        self._capture = cv2.VideoCapture(source)
+        if not self._capture.isOpened():
+            raise DeviceError(
+                f"camera {source}: cannot be opened", code="no_camera", hint="is another program using it?"
+            )
+        if size_px is not None:
+            self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, size_px[0])
+            self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size_px[1])
+
+    def grab(self, label: str) -> Frame:
+        """Return a picture of now.
+
+        Raises
+        ------
+        DeviceError
+            The camera gives none.
+        """
+        for _ in range(STALE_FRAMES):
+            self._capture.grab()
+        good, picture = self._capture.read()
+        if not good:
+            raise DeviceError(f"camera {self._source}: no picture for {label}", code="no_image")
+        grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+        if grey.dtype != np.uint8:
+            raise DeviceError(
+                f"camera {self._source}: pixels of {grey.dtype}, expected 8 bits", code="bad_image"
+            )
+        return Frame(np.ascontiguousarray(grey, dtype=np.uint8), timestamp_s=time.time())
