@@ -1,0 +1,32 @@
+"""The closed loop: the arm moves, the camera looks, every attempt is written down."""
+
+from handeye.session.attempt import Cell, Patience
+from handeye.session.entry import Entry, Failure
+from handeye.session.loop import End, EndReason, Session, Step, Wish
+from handeye.session.request import Reach, Requested, reach
+from handeye.session.simulated import SimulatedCell, SimulationOptions, simulated_cell
+from handeye.session.starting import Start
+from handeye.session.store import SessionStore, create_session, is_session, open_session
+
+__all__ = [
+    "Cell",
+    "End",
+    "EndReason",
+    "Entry",
+    "Failure",
+    "Patience",
+    "Reach",
+    "Requested",
+    "Session",
+    "SessionStore",
+    "SimulatedCell",
+    "SimulationOptions",
+    "Start",
+    "Step",
+    "Wish",
+    "create_session",
+    "is_session",
+    "open_session",
+    "reach",
+    "simulated_cell",
+]

@@ -1,0 +1,138 @@
+"""One attempt at a view, as the journal keeps it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from handeye.types import Pose, View
+from handeye.types.plain import Document, read_document, without_none
+
+
+class Failure(StrEnum):
+    """Why an attempt brought no view."""
+
+    NOT_CONFIRMED = "not_confirmed"
+    MOTION_REFUSED = "motion_refused"
+    ROBOT_FAILED = "robot_failed"
+    ELSEWHERE = "elsewhere"
+    CAMERA_FAILED = "camera_failed"
+    CAMERA_TIMEOUT = "camera_timeout"
+    BAD_IMAGE = "bad_image"
+    STALE_IMAGE = "stale_image"
+    POOR_IMAGE = "poor_image"
+    NOT_FOUND = "not_found"
+    INCONSISTENT = "inconsistent"
+
+
+# Worth another try at the same place: nothing says that the place is to blame.
+TRANSIENT = frozenset(
+    {
+        Failure.ROBOT_FAILED,
+        Failure.CAMERA_FAILED,
+        Failure.CAMERA_TIMEOUT,
+        Failure.BAD_IMAGE,
+        Failure.STALE_IMAGE,
+        Failure.POOR_IMAGE,
+        Failure.INCONSISTENT,
+    }
+)
+
+
+class _EntryDocument(Document):
+    number: int
+    label: str
+    phase: str
+    goal: list[list[float]]
+    goal_joints: list[float]
+    moved: bool
+    view: dict[str, Any] | None = None
+    failure: Failure | None = None
+    detail: str = ""
+    decision: dict[str, Any] = {}  # noqa: RUF012 - msgspec copies an empty default
+    timings_s: dict[str, float] = {}  # noqa: RUF012
+    image_digest: str | None = None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One attempt.
+
+    Parameters
+    ----------
+    number
+        Counted from one.
+    label
+        View and number of the try at it: `view_04.2`.
+    phase
+        `start`, `plan`, `nudge` or `retry`: how the goal was chosen.
+    goal, goal_joints
+        Where the arm was sent.
+    moved
+        Whether it went there, as far as is known.
+    view
+        What came of it; None if nothing.
+    failure, detail
+        Why nothing came of it.
+    decision
+        Scores of all candidates, what was predicted, and how many candidates were turned down for what.
+    timings_s
+        Seconds that deciding, moving, exposing and detecting took.
+    image_digest
+        Of the image, to notice one that comes twice.
+    """
+
+    number: int
+    label: str
+    phase: str
+    goal: Pose
+    goal_joints: tuple[float, ...]
+    moved: bool
+    view: View | None = None
+    failure: Failure | None = None
+    detail: str = ""
+    decision: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    timings_s: Mapping[str, float] = field(default_factory=dict[str, float])
+    image_digest: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON; `from_dict` reads them back."""
+        return without_none(
+            number=self.number,
+            label=self.label,
+            phase=self.phase,
+            goal=self.goal.to_list(),
+            goal_joints=list(self.goal_joints),
+            moved=self.moved,
+            view=None if self.view is None else self.view.to_dict(),
+            failure=None if self.failure is None else self.failure.value,
+            detail=self.detail,
+            decision=dict(self.decision),
+            timings_s=dict(self.timings_s),
+            image_digest=self.image_digest,
+        )
+
+    @classmethod
+    def from_dict(cls, data: object, where: str = "entry") -> "Entry":
+        """Read what `to_dict` wrote.
+
+        Raises
+        ------
+        InputError
+            A missing, unknown or unusable field.
+        """
+        document = read_document(data, _EntryDocument, where)
+        return cls(
+            document.number,
+            document.label,
+            document.phase,
+            Pose(document.goal),
+            tuple(document.goal_joints),
+            document.moved,
+            None if document.view is None else View.from_dict(document.view),
+            document.failure,
+            document.detail,
+            document.decision,
+            document.timings_s,
+            document.image_digest,
+        )

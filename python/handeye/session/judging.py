@@ -1,0 +1,86 @@
+"""Whether what was seen fits what is believed: labels of symmetric boards, and views that cannot be true."""
+
+import numpy as np
+
+from handeye.detection import Detection, relabeled
+from handeye.errors import HandeyeError
+from handeye.solving import Estimate, view_pose
+from handeye.types import Camera, Pose, Target, View
+
+# Root mean square error of one view's own pose beyond which its points are no picture of the target.
+LARGEST_RMSE_PX = 3.0
+# A view this much off what is believed is believed to be wrong, however sure the belief: metres, radians.
+LARGEST_SURPRISE = (0.02, np.deg2rad(3.0))
+SIGMAS = 6.0
+# Fewer views than these cannot speak against another one.
+FEWEST_WITNESSES = 4
+
+
+def labeled(camera: Camera, target: Target, detection: Detection, T_base: Pose, expected: Pose) -> Detection:
+    """Return the detection with those labels, of all that look the same, that fit an expected pose best."""
+    if len(target.symmetries) == 1:
+        return detection
+    best: tuple[float, Detection] | None = None
+    for permutation in target.symmetries:
+        candidate = relabeled(detection, permutation)
+        try:
+            pose = view_pose(camera, target, View("candidate", T_base, candidate.point_ids, candidate.pixels))
+        except HandeyeError:
+            continue
+        angle = (expected.inverse() @ pose.T_camera_target).rotation_angle_rad
+        if best is None or angle < best[0]:
+            best = angle, candidate
+    return detection if best is None else best[1]
+
+
+def objection(
+    camera: Camera, target: Target, view: View, estimate: Estimate | None, views: int
+) -> str | None:
+    """Say why a view cannot be true, None if it may be.
+
+    Parameters
+    ----------
+    estimate
+        What the other views say.
+    views
+        How many these are.
+    """
+    try:
+        pose = view_pose(camera, target, view)
+    except HandeyeError as error:
+        return error.message.removeprefix(f"view {view.name}: ")
+    if pose.rmse_px > LARGEST_RMSE_PX:
+        return f"its points fit the target only to {pose.rmse_px:.1f} px"
+    if estimate is None or views < FEWEST_WITNESSES or not estimate.determined:
+        return None
+    A = estimate.mounting.chain(view.T_base_flange)
+    expected = estimate.X @ A @ estimate.Y
+    choices = [pose.T_camera_target] + ([] if pose.mirrored is None else [pose.mirrored[0]])
+    complaints = [_surprise(estimate, A, expected, seen) for seen in choices]
+    return None if None in complaints else complaints[0]
+
+
+def _surprise(estimate: Estimate, A: Pose, expected: Pose, seen: Pose) -> str | None:
+    middle = estimate.target.points.mean(axis=0)[np.newaxis]
+    off = float(np.linalg.norm(seen.act(middle) - expected.act(middle)))
+    turn = (expected.inverse() @ seen).rotation_angle_rad
+    # First order: C = X A Y moves with the left twists of X and, carried over by X A, of Y.
+    carried = (estimate.X @ A).adjoint()
+    jacobian = np.hstack([np.eye(6), carried])
+    # At the middle of the target rather than at the camera's centre.
+    x, y, z = expected.act(middle)[0]
+    lever = np.eye(6)
+    lever[:3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+    jacobian = lever @ jacobian
+    covariance = jacobian @ estimate.covariance[:12, :12] @ jacobian.T
+    robot = max(h.robot_translation_m for h in estimate.hypotheses)
+    sigma_m = float(np.sqrt(np.trace(covariance[:3, :3]) + 3 * robot**2))
+    sigma_rad = float(np.sqrt(np.trace(covariance[3:, 3:])))
+    most_m = max(LARGEST_SURPRISE[0], SIGMAS * sigma_m)
+    most_rad = max(LARGEST_SURPRISE[1], SIGMAS * sigma_rad)
+    if off <= most_m and turn <= most_rad:
+        return None
+    return (
+        f"the target would be {1e3 * off:.0f} mm and {np.rad2deg(turn):.1f} deg from where all other views "
+        f"have it"
+    )

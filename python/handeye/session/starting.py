@@ -1,0 +1,82 @@
+"""The first views, before anything is known of where the camera sits: small turns about where the arm stands.
+
+The turns are about the flange's own origin, as large as the room around the target in the first image allows,
+each about another axis, so that three views determine the answer. A turn that loses the target is tried
+smaller and
+the other way round.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from handeye.planning.collisions import Body, Workspace
+from handeye.robots import Arm
+from handeye.types import Camera, Pose, View
+from handeye.types.arrays import FloatArray
+
+# Directions of the turns in the frame of the flange, one per view after the first; the roll is about z.
+_TURNS = np.array(
+    [
+        [1.0, 0.3, 1.0],
+        [-0.3, 1.0, -1.0],
+        [-1.0, -0.5, 0.5],
+        [0.5, -1.0, -0.5],
+        [0.7, 0.7, 1.2],
+        [-0.7, 0.7, -1.2],
+        [0.0, 0.0, 1.6],
+    ]
+)
+MOST_VIEWS = len(_TURNS) + 1
+LARGEST_TILT_RAD, LARGEST_ROLL_RAD = 0.30, 0.35
+SMALLEST_TILT_RAD = 0.05
+# Share of the room in the image that a turn may use, and by how much it shrinks where it fails.
+ROOM_SHARE, SHRINK = 0.7, 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where the arm stood when the session began."""
+
+    T_base_flange: Pose
+    joints_rad: tuple[float, ...]
+
+
+def starting_goal(
+    start: Start, views: Sequence[View], failures: int, camera: Camera, arm: Arm, workspace: Workspace
+) -> tuple[Pose, FloatArray] | None:
+    """Return the next safe pose and its joints, None if there is none.
+
+    Parameters
+    ----------
+    views
+        Views so far.
+    failures
+        Attempts at the next view that failed since the last view.
+    """
+    if not views:
+        return start.T_base_flange, np.array(start.joints_rad)
+    if len(views) >= MOST_VIEWS:
+        return None
+    body = Body(arm, workspace)
+    for trial in range(failures, failures + 6):
+        pose = start.T_base_flange @ Pose.exp(_twist(views, trial, camera))
+        joints, reached = arm.inverse_all(pose.matrix[np.newaxis], np.array(start.joints_rad), attempts=1)
+        if reached[0] and body.obstacle_on_path(start.joints_rad, joints[0]) is None:
+            return Pose(arm.forward(joints[0])), joints[0]
+    return None
+
+
+def _twist(views: Sequence[View], trial: int, camera: Camera) -> FloatArray:
+    room = _room_px(views[0], camera) / float(camera.parameters[:2].max())
+    tilt = np.clip(ROOM_SHARE * room, SMALLEST_TILT_RAD, LARGEST_TILT_RAD) * SHRINK ** (trial // 2)
+    roll = LARGEST_ROLL_RAD * SHRINK ** (trial // 2)
+    turn = _TURNS[len(views) - 1] * [tilt, tilt, roll] * (-1.0) ** trial
+    return np.concatenate([np.zeros(3), turn])
+
+
+def _room_px(view: View, camera: Camera) -> float:
+    """Distance of the outermost point from the border of the image."""
+    low, high = view.pixels.min(axis=0), view.pixels.max(axis=0)
+    return float(min(low.min(), (np.array(camera.size_px) - 1 - high).min()))
