@@ -2,7 +2,8 @@
 
 Robot noise is marginalised on the flange side, on the base side or not at all; its levels and its side are
 weighed by their restricted likelihood and the answer is averaged over them. Camera parameters have the
-covariance of their calibration, inflated, as a prior. Every view has its own pixel noise.
+covariance of their calibration, inflated, as a prior. Every view has its own pixel noise. Where the arm's
+kinematics are known, noise of its joints is a further hypothesis and offsets of its joints are parameters.
 """
 
 from dataclasses import dataclass, replace
@@ -12,11 +13,14 @@ import numpy as np
 from handeye import _core
 from handeye.solving.estimate import Estimate, Hypothesis, side_of_robot
 from handeye.solving.initialize import check_views
+from handeye.solving.joints import JointModel
 from handeye.solving.measurements import Measurements, ViewPose
 from handeye.solving.observability import undetermined
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName, Noise, RobotSide
 from handeye.types.camera import Camera
+from handeye.types.kinematics import Kinematics
+from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
 
 # A camera calibration's covariance is a plain inverse of J'J: too small by about this factor in deviation.
@@ -75,6 +79,13 @@ class AutoOptions:
         Factor on the deviations of the camera's calibration.
     free_camera
         Whether camera parameters are free at all.
+    kinematics
+        The arm, if it is known; every view must then have joint positions.
+    joint_noise_rad
+        Standard deviation of the noise of the joints if known; the robot then errs in nothing else. None to
+        find it, and to weigh it against noise of flange and base.
+    joint_offset_rad
+        Standard deviation of the offsets of the joints if known, zero for none; None to find it.
     """
 
     exact_robot_probability: float = 1 / 3
@@ -82,6 +93,9 @@ class AutoOptions:
     levels: tuple[float, float] | None = None
     camera_inflation: float = CAMERA_INFLATION
     free_camera: bool = True
+    kinematics: Kinematics | None = None
+    joint_noise_rad: float | None = None
+    joint_offset_rad: float | None = None
 
 
 @dataclass(frozen=True)
@@ -96,7 +110,7 @@ class AutoEstimator:
         Raises
         ------
         InputError
-            Fewer than three views.
+            Fewer than three views, or views without the joint positions that the arm needs.
         """
         check_views(measurements)
         estimate = self._once(measurements, previous)
@@ -120,26 +134,26 @@ class AutoEstimator:
         sides = [
             name for name, side in zip(("left", "right"), left_first, strict=True) if side in options.sides
         ]
+        arm = None if options.kinematics is None else JointModel.of(options.kinematics, measurements)
         posterior = compressed.estimate(
             camera_prior=prior.information if prior.free else None,
             start=None if previous is None else (previous.X.matrix, previous.Y.matrix),
             exact_probability=options.exact_robot_probability,
             sides=sides,
             levels=options.levels,
+            joints=None if arm is None else arm.errors(options.joint_noise_rad, options.joint_offset_rad),
         )
         parameters = np.array(measurements.camera.parameters)
         parameters[list(prior.free)] += posterior.camera_delta
         camera = Camera(measurements.camera.lens, parameters, *measurements.camera.size_px)
         hypotheses = tuple(
-            Hypothesis(
-                probability, side_of_robot(mounting, side), translation, rotation, posterior.information(i)
-            )
-            for i, (side, translation, rotation, probability) in enumerate(posterior.hypotheses)
+            _hypothesis(posterior, i, mounting, arm)
+            for i, (_, _, _, probability) in enumerate(posterior.hypotheses)
             if probability > 1e-4
         )
         sigma_px = np.sqrt(posterior.variances_px2)
         X, Y = Pose(posterior.x), Pose(posterior.y)
-        noise = _noise(sigma_px, hypotheses)
+        noise = _noise(sigma_px, hypotheses, arm)
         return Estimate(
             mounting=mounting,
             target=measurements.target,
@@ -157,12 +171,30 @@ class AutoEstimator:
             free_camera=prior.free,
             unobservable=undetermined(measurements, X, Y, noise),
             degrees_of_freedom=max(posterior.degrees_of_freedom, FEWEST_DEGREES_OF_FREEDOM),
+            kinematics=options.kinematics,
+            free_joints=() if arm is None else arm.free,
+            joint_offsets=() if arm is None else arm.offsets(posterior.joint_offsets, posterior.covariance),
         )
 
 
-def _noise(sigma_px: FloatArray, hypotheses: tuple[Hypothesis, ...]) -> Noise:
+def _hypothesis(
+    posterior: _core.Posterior, rank: int, mounting: Mounting, arm: JointModel | None
+) -> Hypothesis:
+    side, translation, rotation, probability = posterior.hypotheses[rank]
+    joint_rad, _ = posterior.joint_levels[rank]
+    deviations: tuple[float, ...] = ()
+    if arm is not None and joint_rad > 0:
+        translation, rotation = arm.lever_m * joint_rad, arm.turn * joint_rad
+        deviations = arm.deviations(joint_rad)
+    information = posterior.information(rank)
+    return Hypothesis(
+        probability, side_of_robot(mounting, side), translation, rotation, information, deviations
+    )
+
+
+def _noise(sigma_px: FloatArray, hypotheses: tuple[Hypothesis, ...], arm: JointModel | None) -> Noise:
     """Sum the hypotheses up: the likeliest side, and its levels as geometric means."""
-    evidence = {side.value: 0.0 for side in RobotSide}
+    evidence = {side.value: 0.0 for side in RobotSide if side is not RobotSide.JOINTS or arm is not None}
     for hypothesis in hypotheses:
         evidence[hypothesis.robot_side.value] += hypothesis.probability
     side = RobotSide(max(evidence, key=lambda name: evidence[name]))
@@ -180,6 +212,7 @@ def _noise(sigma_px: FloatArray, hypotheses: tuple[Hypothesis, ...]) -> Noise:
         float(rotation),
         how="restricted likelihood, averaged over sides and levels",
         evidence=evidence,
+        joint_rad=float(translation) / arm.lever_m if arm is not None and side is RobotSide.JOINTS else 0.0,
     )
 
 

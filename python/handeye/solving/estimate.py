@@ -10,8 +10,9 @@ from handeye import _core
 from handeye.errors import DegenerateError
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import ModelName, Noise, RobotSide, Unobservable
+from handeye.types.calibration import JointOffset, ModelName, Noise, RobotSide, Unobservable
 from handeye.types.camera import Camera
+from handeye.types.kinematics import Kinematics
 from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
 from handeye.types.target import Target
@@ -44,17 +45,20 @@ class Sight:
 
 
 def side_of_chain(mounting: Mounting, side: RobotSide) -> str | None:
-    """Return which side of A in the chain a side of the robot is: "left", "right", or None for no noise."""
+    """Return which side of A in the chain a side of the robot is: "left", "right", or None for no noise.
+
+    Noise of the joints counts as noise of the flange, where it is not known how they move it.
+    """
     if side is RobotSide.NONE:
         return None
     flange_is_left = mounting is Mounting.EYE_IN_HAND
-    return "left" if (side is RobotSide.FLANGE) == flange_is_left else "right"
+    return "right" if (side is RobotSide.BASE) == flange_is_left else "left"
 
 
 def side_of_robot(mounting: Mounting, side: str) -> RobotSide:
-    """Return which side of the robot a side of A in the chain is; "none" is none."""
-    if side == "none":
-        return RobotSide.NONE
+    """Return which side of the robot a side of A in the chain is; "none" and "joints" are what they are."""
+    if side in {"none", "joints"}:
+        return RobotSide(side)
     flange_is_left = mounting is Mounting.EYE_IN_HAND
     return RobotSide.FLANGE if (side == "left") == flange_is_left else RobotSide.BASE
 
@@ -66,13 +70,22 @@ def isotropic_root(translation_m: float, rotation_rad: float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """What the robot's noise may be, how probable that is, and the information (n, n) under it."""
+    """What the robot's noise may be, how probable that is, and the information (n, n) under it.
+
+    Parameters
+    ----------
+    robot_translation_m, robot_rotation_rad
+        Standard deviations per axis; of the flange on average, if the noise is in the joints.
+    joint_deviations
+        Standard deviation of each joint (radians, metres), if the noise is in the joints.
+    """
 
     probability: float
     robot_side: RobotSide
     robot_translation_m: float
     robot_rotation_rad: float
     information: FloatArray
+    joint_deviations: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +97,15 @@ class Estimate:
     X, Y, camera
         The current answer.
     covariance
-        (n, n) covariance of `[xi_x, xi_y, free camera parameters]`.
+        (n, n) covariance of `[xi_x, xi_y, free camera parameters, free joint offsets]`.
     hypotheses
         What the robot's noise may be, likeliest first; one that is exact under the paper's model.
     free_camera
         Indices of the free camera parameters.
     candidate_sigma_px
         Pixel noise expected of a further view.
+    kinematics, free_joints, joint_offsets
+        The arm, if it is known, which of its joints have an offset that is a parameter, and what it is.
     unobservable
         Directions of X and Y that the views leave open; a weak prior stands in for them.
     """
@@ -111,6 +126,9 @@ class Estimate:
     free_camera: tuple[int, ...] = ()
     unobservable: tuple[Unobservable, ...] = ()
     degrees_of_freedom: float = float("inf")
+    kinematics: Kinematics | None = None
+    free_joints: tuple[int, ...] = ()
+    joint_offsets: tuple[JointOffset, ...] = ()
 
     @property
     def determined(self) -> bool:
@@ -164,10 +182,18 @@ class Estimate:
             robot_side=side,
             robot_root=None if side is None else root,
             free_camera=list(self.free_camera) or None,
+            free_joints=list(self.free_joints) or None,
+            joint_noise=list(hypothesis.joint_deviations) or None,
             image_size=None if sight.known else (width, height),
             margin_px=sight.margin_px,
             fewest=1 if sight.known else sight.fewest or self.target.point_count,
         )
+
+    def jacobians(self, joints: FloatArray | None) -> FloatArray | None:
+        """(N, 6, n) how joints at positions (N, n) move A; None where arm or positions are not known."""
+        if self.kinematics is None or joints is None:
+            return None
+        return self.kinematics.motion_jacobians(self.mounting, joints)
 
     def gains(
         self,
@@ -175,6 +201,7 @@ class Estimate:
         motions: FloatArray,
         sight: Sight,
         *,
+        joints: FloatArray | None = None,
         over_posterior: bool = False,
     ) -> FloatArray:
         """(N,) gain of candidate views at `motions` (N, 4, 4), averaged over what the robot's noise may be.
@@ -189,6 +216,9 @@ class Estimate:
             A of the chain of each candidate.
         sight
             What a candidate must show.
+        joints
+            (N, n) joint positions of the candidates, if the arm is known. Without them noise of the joints is
+            taken as noise of the flange of the same size, and offsets of the joints as if they moved nothing.
         over_posterior
             Average over sigma points of X and Y as well: a young estimate is wrong, and a view must be worth
             taking wherever the truth may be. Where a sigma point does not show the target it gains nothing.
@@ -198,20 +228,24 @@ class Estimate:
         DegenerateError
             The information is singular.
         """
-        gains = self._gains_at(criterion, motions, sight)
+        jacobians = self.jacobians(joints)
+        gains = self._gains_at(criterion, motions, sight, jacobians)
         if not over_posterior:
             return gains
         points = [gains]
         for X, Y in self._sigma_points():
             moved = replace(self, X=X, Y=Y)
-            points.append(np.nan_to_num(moved._gains_at(criterion, motions, sight)))
+            points.append(np.nan_to_num(moved._gains_at(criterion, motions, sight, jacobians)))
         return np.mean(points, axis=0)
 
-    def _gains_at(self, criterion: _core.Criterion, motions: FloatArray, sight: Sight) -> FloatArray:
+    def _gains_at(
+        self, criterion: _core.Criterion, motions: FloatArray, sight: Sight, jacobians: FloatArray | None
+    ) -> FloatArray:
         total = np.zeros(len(motions))
         for probability, hypothesis in self.averaged:
             belief = _core.Belief(hypothesis.information)
-            total += probability * self.predictor(hypothesis, sight).gains(belief, criterion, motions)
+            predictor = self.predictor(hypothesis, sight)
+            total += probability * predictor.gains(belief, criterion, motions, jacobians=jacobians)
         return total
 
     def _sigma_points(self) -> list[tuple[Pose, Pose]]:

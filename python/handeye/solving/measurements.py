@@ -128,6 +128,26 @@ class Measurements:
         return np.array([self.mounting.chain(v.T_base_flange).matrix for v in self.views]).reshape(-1, 4, 4)
 
     @cached_property
+    def joints(self) -> FloatArray:
+        """(K, n) joint positions of each view, radians (metres for sliding joints).
+
+        Raises
+        ------
+        InputError
+            A view has none, or another number of them than the first.
+        """
+        for view in self.views:
+            if view.joints_rad is None or len(view.joints_rad) != len(self.views[0].joints_rad or ()):
+                raise InputError(
+                    f"view {view.name}: {len(view.joints_rad or ())} joint positions, "
+                    f"the first view has {len(self.views[0].joints_rad or ())}",
+                    code="no_joints",
+                    hint="the arm's kinematics need the joint positions of every view: record them, or leave "
+                    "the arm away",
+                )
+        return np.array([view.joints_rad for view in self.views], dtype=float)
+
+    @cached_property
     def camera_poses(self) -> FloatArray:
         """(K, 4, 4) `T_camera_target` of each view, from its image alone."""
         return np.array([pose.T_camera_target.matrix for pose in self.poses]).reshape(-1, 4, 4)

@@ -31,6 +31,8 @@ class RobotSide(StrEnum):
     NONE = "none"
     FLANGE = "flange"
     BASE = "base"
+    JOINTS = "joints"
+    """In the positions of the joints; compared only where the arm's kinematics are known."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,9 @@ class Noise:
     robot_side
         Where the robot's error acts; `none` if its poses are taken as exact.
     robot_translation_m, robot_rotation_rad
-        Standard deviation per axis of the robot's error.
+        Standard deviation per axis of the robot's error; of the flange on average, if it acts in the joints.
+    joint_rad
+        Standard deviation of the position of each joint, if the error acts there.
     how
         How the levels were found, in one line.
     evidence
@@ -57,10 +61,13 @@ class Noise:
     robot_rotation_rad: float = 0.0
     how: str = ""
     evidence: dict[str, float] = field(default_factory=dict[str, float])
+    joint_rad: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON, with units in the keys."""
+        joints = {"joint_deg": float(np.rad2deg(self.joint_rad))} if self.joint_rad > 0 else {}
         return {
+            **joints,
             "pixel_sigma_px": float(np.sqrt(np.mean(np.square(self.pixel_sigma_px)))),
             "pixel_sigma_per_view_px": list(self.pixel_sigma_px),
             "robot_side": self.robot_side.value,
@@ -68,6 +75,28 @@ class Noise:
             "robot_rotation_deg": float(np.rad2deg(self.robot_rotation_rad)),
             "how": self.how,
             "evidence": dict(self.evidence),
+        }
+
+
+@dataclass(frozen=True)
+class JointOffset:
+    """By how much a joint truly stands beyond where it is read, and how well that is known.
+
+    Both in radians, in metres for a joint that slides.
+    """
+
+    joint: str
+    offset: float
+    sigma: float
+    sliding: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON, with units in the keys."""
+        unit, factor = ("mm", MM_PER_M) if self.sliding else ("deg", float(np.rad2deg(1.0)))
+        return {
+            "joint": self.joint,
+            f"offset_{unit}": self.offset * factor,
+            f"sigma_{unit}": self.sigma * factor,
         }
 
 
@@ -129,6 +158,8 @@ class Calibration:
         (n, n) information of all parameters, twist of X first, then of Y.
     rmse_px
         Root mean square over all points of all used views of the residual's norm.
+    joint_offsets
+        What was found of the offsets of the joints, where the arm's kinematics were given.
     degrees_of_freedom
         Degrees of freedom of the noise levels behind the covariance; infinite if they were given. Regions
         take quantiles of F(6, degrees of freedom) in place of chi-square.
@@ -151,6 +182,7 @@ class Calibration:
     diagnosis: tuple[Finding, ...] = ()
     unobservable: tuple[Unobservable, ...] = ()
     degrees_of_freedom: float = float("inf")
+    joint_offsets: tuple[JointOffset, ...] = ()
 
     @property
     def results(self) -> dict[str, Pose]:
@@ -175,7 +207,9 @@ class Calibration:
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON: stable keys, transforms row-major in metres, units in the keys."""
         deviations = np.sqrt(np.diag(self.covariance))
+        offsets = [offset.to_dict() for offset in self.joint_offsets]
         return {
+            **({"joint_offsets": offsets} if offsets else {}),
             "mounting": self.mounting.value,
             **{name: pose.to_list() for name, pose in self.results.items()},
             "rmse_px": self.rmse_px,
