@@ -34,7 +34,8 @@ help: ## list the targets
 
 demo: build ## replay a shipped recording under three policies, print the table, draw the picture
 	$(say) 'handeye demo'
-	@$(BIN)/handeye demo
+	@mkdir -p out
+	@$(BIN)/handeye demo --picture out/demo.png
 
 test: check ## everything: the checks, the Rust tests, the Python tests, every example, every command in the README
 	$(say) 'cargo test'

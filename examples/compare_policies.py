@@ -7,7 +7,7 @@ from handeye.evaluation.protocol import Protocol
 from handeye.types.calibration import ModelName
 
 recording = read_recording(shipped_recording()).recording
-protocol = Protocol(trials=4, start_views=3, added_views=5, seed=1)
+protocol = Protocol(trials=2, start_views=3, added_views=5, seed=1)
 
 for model in ModelName:
     (result,) = compare([recording], Comparison(protocol, model))

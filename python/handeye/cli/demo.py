@@ -23,7 +23,7 @@ _NAMES = {
     Way("next_best_view"): "next best view",
     Way("random"): "random",
     Way("max_distance"): "max distance",
-    Way("next_best_view", ModelName.PAPER): "the same, exact robot",
+    Way("next_best_view", ModelName.PAPER): "next best (paper)",
 }
 
 

@@ -1,0 +1,122 @@
+"""The reference of the JSON keys and the commands agree: no key undocumented, none documented that is not there."""
+
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from commands import Handeye
+from folders import made_recording, parallel_recording, written
+from handeye.datasets.shipped import shipped_recording
+
+ROOT = Path(__file__).resolve().parents[2]
+REFERENCE = (ROOT / "docs" / "json.md").read_text()
+ROW = re.compile(r"^\| `([^`]+)` \|", re.MULTILINE)
+
+
+def documented(title: str) -> list[str]:
+    """The keys of a section's table."""
+    section = re.split(r"^## ", REFERENCE, flags=re.MULTILINE)
+    (body,) = [text for text in section if text.startswith(title + "\n")]
+    return ROW.findall(body)
+
+
+def keys(value: object, path: str = "") -> Iterator[str]:
+    """The paths of all values that are not objects, and of lists of objects also the lists."""
+    if isinstance(value, dict) and value:
+        for key, item in value.items():
+            yield from keys(item, f"{path}.{key}" if path else key)
+        return
+    yield path
+    if isinstance(value, list):
+        for item in value:
+            if isinstance(item, dict):
+                yield from keys(item, f"{path}[]")
+
+
+def matches(pattern: str, key: str) -> bool:
+    return re.fullmatch(re.sub(r"<[a-z]+>", r"[^.]+", re.escape(pattern)), key) is not None
+
+
+def compare(title: str, *answers: dict[str, Any]) -> None:
+    rows = documented(title)
+    found = {key for answer in answers for key in keys(answer)}
+    # What lies inside an object of free form is not listed.
+    free = tuple(row for row in rows if row.endswith("evidence"))
+    unknown = [
+        key
+        for key in sorted(found)
+        if not any(matches(row, key) for row in [*rows, *(p for row in rows for p in prefixes(row))])
+        and not any(matches(row, key[: len(row)]) and key[len(row) : len(row) + 1] == "." for row in free)
+    ]
+    assert not unknown, unknown
+    objects = {prefix for key in found for prefix in prefixes(key)}
+    missing = [row for row in rows if not any(matches(row, key) for key in found | objects)]
+    assert not missing, missing
+
+
+def prefixes(key: str) -> Iterator[str]:
+    parts = key.split(".")
+    return (".".join(parts[:i]) for i in range(1, len(parts)))
+
+
+@pytest.fixture
+def shipped(tmp_path: Path) -> Path:
+    """The shipped recording, with one view spoiled so that something is left out."""
+    folder = tmp_path / "recording"
+    shutil.copytree(shipped_recording(), folder)
+    corners = folder / "corners" / "im_01.csv"
+    corners.write_text("\n".join(corners.read_text().splitlines()[:4]))
+    return folder
+
+
+def test_solve(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
+    open_directions = written(parallel_recording(), tmp_path / "parallel")
+    compare(
+        "handeye solve",
+        handeye.json("solve", shipped),
+        handeye.json("solve", shipped, "--model", "paper"),
+        handeye.json("solve", open_directions, "--reduced"),
+    )
+
+
+def test_plan(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
+    poses = tmp_path / "poses.csv"
+    poses.write_text("x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,1\n")
+    open_directions = written(parallel_recording(), tmp_path / "parallel")
+    compare(
+        "handeye plan",
+        handeye.json("plan", shipped),
+        handeye.json("plan", shipped, "--candidates", poses),
+        handeye.json("plan", open_directions),
+    )
+
+
+def test_validate(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
+    without_truth = made_recording(8)
+    object.__setattr__(without_truth, "truth", None)
+    compare(
+        "handeye validate",
+        handeye.json("validate", shipped, "--splits", "2"),
+        handeye.json("validate", written(without_truth, tmp_path / "made"), "--splits", "2"),
+    )
+
+
+def test_demo(handeye: Handeye, tmp_path: Path) -> None:
+    compare("handeye demo", handeye.json("demo", "--starts", "1", "--picture", tmp_path / "demo.png"))
+    assert (tmp_path / "demo.png").stat().st_size > 10_000
+
+
+def test_errors(handeye: Handeye) -> None:
+    outcome = handeye("solve", "nowhere", "--json")
+    compare("Errors", outcome.data)
+
+
+def test_paths_are_understood() -> None:
+    data = {"a": {"b": 1, "c": {}}, "d": [{"e": 1}, {"f": [1, 2]}], "g": [[1], [2]], "h": []}
+    assert sorted(set(keys(data))) == ["a.b", "a.c", "d", "d[].e", "d[].f", "g", "h"]
+    assert matches("a[].<any>.c", "a[].b.c")
+    assert not matches("a.<any>", "a.b.c")
