@@ -78,6 +78,23 @@ impl CandidateJoints {
     }
 }
 
+/// Information of a view, being summed.
+pub(super) struct Sums {
+    pub moments: Moments,
+    pub columns: Option<PixelColumns>,
+}
+
+impl Sums {
+    fn clear(&mut self) {
+        self.moments = Moments::new();
+        if let Some(columns) = &mut self.columns {
+            columns.mc.fill(0.0);
+            columns.cc.fill(0.0);
+            columns.gc.fill(0.0);
+        }
+    }
+}
+
 impl CandidateModel<'_> {
     /// Number of global parameters of the belief it goes with.
     pub fn parameter_count(&self) -> usize {
@@ -86,36 +103,13 @@ impl CandidateModel<'_> {
 
     /// The quadratic at the predicted pose, robot error marginalised; `None` if too little is in sight.
     fn block(&self, motion: &Se3, joints: Option<&CandidateJoints>) -> Option<(ViewBlock, usize)> {
-        let pose = self.x * *motion * self.y;
-        let information = 1.0 / (self.pixel_sigma * self.pixel_sigma);
-        let nothing = Vector2::zeros();
-        let mut moments = Moments::new();
-        let mut columns = self.pixel_parameters.map(|p| (p, PixelColumns::zeros(p.count())));
-        let mut seen = 0;
-        for feature in self.features {
-            if let Some((parameters, columns)) = &mut columns {
-                let Some(o) = self.camera.observe_with_derivatives(&pose, feature) else { continue };
-                if !self.in_image(&o.pixel) {
-                    continue;
-                }
-                moments.add(&o.d_twist, None, &nothing, information);
-                columns.add(parameters, &o, &(pose.rotation * feature.position), &nothing, information, None);
-            } else {
-                let Some((pixel, d)) = self.camera.observe_with_twist_derivative(&pose, feature) else {
-                    continue;
-                };
-                if !self.in_image(&pixel) {
-                    continue;
-                }
-                moments.add(&d, None, &nothing, information);
-            }
-            seen += 1;
-        }
+        let mut sums = self.sums();
+        let seen = self.sum(&(self.x * *motion * self.y), &mut sums);
         if seen < self.sight.fewest.max(1) {
             return None;
         }
-        let (m, g) = moments.finish();
-        let block = ViewBlock { m, g, columns: columns.map(|c| c.1), cost: 0.0, squared_px: 0.0 };
+        let (m, g) = sums.moments.finish();
+        let block = ViewBlock { m, g, columns: sums.columns, cost: 0.0, squared_px: 0.0 };
         let of_joints = joints.and_then(|j| j.noise_root).map(|root| (Side::Left, root));
         let Some((side, root)) = &of_joints.or(self.robot) else { return Some((block, seen)) };
         let before = match side {
@@ -123,6 +117,42 @@ impl CandidateModel<'_> {
             Side::Right => self.x * *motion,
         };
         Some((marginalised(&block, &(before.adjoint() * root)), seen))
+    }
+
+    /// Empty sums for [`CandidateModel::sum`].
+    pub(super) fn sums(&self) -> Sums {
+        Sums {
+            moments: Moments::new(),
+            columns: self.pixel_parameters.map(|p| PixelColumns::zeros(p.count())),
+        }
+    }
+
+    /// Sums the information of the features in sight at a pose, the robot taken as exact; their number.
+    pub(super) fn sum(&self, pose: &Se3, sums: &mut Sums) -> usize {
+        let weight = 1.0 / (self.pixel_sigma * self.pixel_sigma);
+        let nothing = Vector2::zeros();
+        sums.clear();
+        let mut seen = 0;
+        for feature in self.features {
+            if let Some((parameters, columns)) = self.pixel_parameters.zip(sums.columns.as_mut()) {
+                let Some(o) = self.camera.observe_with_derivatives(pose, feature) else { continue };
+                if !self.in_image(&o.pixel) {
+                    continue;
+                }
+                sums.moments.add(&o.d_twist, None, &nothing, weight);
+                columns.add(parameters, &o, &(pose.rotation * feature.position), &nothing, weight, None);
+            } else {
+                let Some((pixel, d)) = self.camera.observe_with_twist_derivative(pose, feature) else {
+                    continue;
+                };
+                if !self.in_image(&pixel) {
+                    continue;
+                }
+                sums.moments.add(&d, None, &nothing, weight);
+            }
+            seen += 1;
+        }
+        seen
     }
 
     #[inline]
@@ -156,21 +186,6 @@ impl CandidateModel<'_> {
         Some(Candidate { factor, seen })
     }
 
-    /// Information of the camera-frame twist at a pose, the robot taken as exact, and the number of features in sight.
-    pub(super) fn information(&self, pose: &Se3) -> (Matrix6<f64>, usize) {
-        let weight = 1.0 / (self.pixel_sigma * self.pixel_sigma);
-        let mut moments = Moments::new();
-        let mut seen = 0;
-        for feature in self.features {
-            let Some((pixel, d)) = self.camera.observe_with_twist_derivative(pose, feature) else { continue };
-            if self.in_image(&pixel) {
-                moments.add(&d, None, &Vector2::zeros(), weight);
-                seen += 1;
-            }
-        }
-        (moments.finish().0, seen)
-    }
-
     /// Gains of candidates at the motions; NaN where too little would be in sight.
     ///
     /// # Errors
@@ -197,11 +212,12 @@ impl CandidateModel<'_> {
     ) -> Result<Vec<f64>, Error> {
         self.check(belief)?;
         let mut gains = vec![f64::NAN; motions.len()];
-        if let Some(of) = criterion.entropy_of().filter(|_| belief.len() == CHAIN) {
-            Scorer::new(self, belief, of, execution.unit)?.score(motions, execution, &mut gains)?;
+        let prepared = criterion.prepare(belief)?;
+        if let Some(quantity) = criterion.quantity() {
+            Scorer::new(self, belief, &quantity, prepared, execution.unit)?
+                .score(motions, execution, &mut gains)?;
             return Ok(gains);
         }
-        let prepared = criterion.prepare(belief)?;
         for (i, gain) in gains.iter_mut().enumerate() {
             if let Some(candidate) = self.candidate(&motions.get(i)?, None) {
                 *gain = prepared.gain(&candidate.factor);
@@ -272,7 +288,7 @@ impl Motions<'_> {
         self.len() == 0
     }
 
-    fn get(&self, i: usize) -> Result<Se3, Error> {
+    pub(super) fn get(&self, i: usize) -> Result<Se3, Error> {
         match self {
             Self::Transforms(transforms) => Ok(transforms[i]),
             Self::Matrices(matrices) => {
@@ -343,25 +359,37 @@ impl Model {
     }
 }
 
-/// `L` with `L L' = m` for a positive semi-definite `m`: Cholesky that leaves null columns zero.
-pub(crate) fn semidefinite_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
+/// `F` with `F F' = m` for a positive semi-definite `m`: Cholesky with diagonal pivoting, which leaves the columns of
+/// null directions zero (Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., 2002, section 10.3).
+fn semidefinite_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
     let n = m.nrows();
-    let floor: Vec<f64> = (0..n).map(|i| 1e-13 * m[(i, i)].abs()).collect();
-    for j in 0..n {
-        let pivot = m[(j, j)];
-        let inverse = if pivot > floor[j] && pivot > 0.0 { 1.0 / pivot.sqrt() } else { 0.0 };
-        for i in j..n {
-            m[(i, j)] *= inverse;
+    let scale: Vec<f64> = (0..n).map(|i| m[(i, i)].abs()).collect();
+    let mut left: Vec<usize> = (0..n).collect();
+    let mut root = DMatrix::zeros(n, n);
+    for column in 0..n {
+        // Sizes are compared in units of the diagonal: translations and rotations differ by orders.
+        let relative = |i: usize| if scale[i] > 0.0 { m[(i, i)] / scale[i] } else { 0.0 };
+        let Some(at) = (0..left.len()).max_by(|a, b| relative(left[*a]).total_cmp(&relative(left[*b])))
+        else {
+            break;
+        };
+        let k = left.swap_remove(at);
+        if relative(k).is_nan() || relative(k) <= NULL_PIVOT {
+            break;
         }
-        for k in j + 1..n {
-            let f = m[(k, j)];
-            for i in k..n {
-                m[(i, k)] -= m[(i, j)] * f;
+        let pivot = m[(k, k)].sqrt();
+        root[(k, column)] = pivot;
+        for i in &left {
+            root[(*i, column)] = m[(*i, k)] / pivot;
+        }
+        for i in &left {
+            for j in &left {
+                m[(*i, *j)] -= root[(*i, column)] * root[(*j, column)];
             }
         }
-        for i in 0..j {
-            m[(i, j)] = 0.0;
-        }
     }
-    m
+    root
 }
+
+/// Pivots below this fraction of their diagonal are rounding.
+const NULL_PIVOT: f64 = 1e-14;

@@ -65,7 +65,7 @@ impl Moments {
     }
 
     /// Adds `d' w d` and `d' w r` of a point; `residual` whitened already.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn add(
         &mut self,
         d_twist: &Matrix2x6<f64>,

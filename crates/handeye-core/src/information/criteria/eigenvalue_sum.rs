@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Criterion, Gain, Scales};
+use super::{Criterion, Gain, Quantity, Scales};
 use crate::error::Error;
 use crate::information::Belief;
 use crate::information::belief::CHAIN;
@@ -23,6 +23,10 @@ impl Criterion for EigenvalueSum {
 
     fn prepare<'a>(&'a self, _belief: &'a Belief) -> Result<Box<dyn Gain + 'a>, Error> {
         Ok(Box::new(*self))
+    }
+
+    fn quantity(&self) -> Option<Quantity> {
+        Some(Quantity::InformationTrace(self.scales.all()))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Criterion, EntropyOf, Gain, log_det_update};
+use super::{Criterion, EntropyOf, Gain, Quantity, log_det_update};
 use crate::error::Error;
 use crate::information::Belief;
 
@@ -21,8 +21,8 @@ impl Criterion for Entropy {
         Ok(Box::new(Prepared(belief)))
     }
 
-    fn entropy_of(&self) -> Option<EntropyOf> {
-        Some(EntropyOf::Everything)
+    fn quantity(&self) -> Option<Quantity> {
+        Some(Quantity::Entropy(EntropyOf::Everything))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Criterion, EntropyOf, Gain, log_det_update};
+use super::{Criterion, EntropyOf, Gain, Quantity, log_det_update};
 use crate::error::Error;
 use crate::information::Belief;
 
@@ -27,8 +27,8 @@ impl Criterion for EntropyHandEye {
         Ok(Box::new(Prepared { belief, nuisance }))
     }
 
-    fn entropy_of(&self) -> Option<EntropyOf> {
-        Some(EntropyOf::HandEye)
+    fn quantity(&self) -> Option<Quantity> {
+        Some(Quantity::Entropy(EntropyOf::HandEye))
     }
 }
 

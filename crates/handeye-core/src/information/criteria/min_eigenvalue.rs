@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix6};
 
-use super::{Criterion, Gain, Scales, hand_eye_decrease};
+use super::{Criterion, Gain, Quantity, Scales, hand_eye_decrease};
 use crate::error::Error;
 use crate::information::Belief;
 
@@ -29,14 +29,20 @@ impl Criterion for MinEigenvalue {
         let before = largest(&(scales * belief.hand_eye_covariance() * scales));
         Ok(Box::new(Prepared { belief, scales, before }))
     }
+
+    fn quantity(&self) -> Option<Quantity> {
+        Some(Quantity::HandEyeCovariance)
+    }
 }
 
 impl Gain for Prepared<'_> {
     fn gain(&self, factor: &DMatrix<f64>) -> f64 {
-        hand_eye_decrease(self.belief.covariance(), factor).map_or(f64::NAN, |d| {
-            let after = self.belief.hand_eye_covariance() - d;
-            0.5 * (self.before / largest(&(self.scales * after * self.scales))).ln()
-        })
+        hand_eye_decrease(self.belief.covariance(), factor).map_or(f64::NAN, |d| self.gain_of_decrease(&d))
+    }
+
+    fn gain_of_decrease(&self, decrease: &Matrix6<f64>) -> f64 {
+        let after = self.belief.hand_eye_covariance() - decrease;
+        0.5 * (self.before / largest(&(self.scales * after * self.scales))).ln()
     }
 }
 

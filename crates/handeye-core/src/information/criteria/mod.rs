@@ -16,7 +16,7 @@ pub use min_eigenvalue::MinEigenvalue;
 pub use tool_point::{Over, ToolPoint};
 pub use trace::Trace;
 
-use super::belief::Belief;
+use super::belief::{Belief, CHAIN};
 use crate::error::Error;
 
 /// A criterion: prepared once per belief, then asked for the gain of each candidate.
@@ -28,10 +28,24 @@ pub trait Criterion: Sync {
     /// [`Error::Degenerate`] where the belief has no value under this criterion.
     fn prepare<'a>(&'a self, belief: &'a Belief) -> Result<Box<dyn Gain + 'a>, Error>;
 
-    /// Whose entropy this is, if it is one: entropies have a faster form.
-    fn entropy_of(&self) -> Option<EntropyOf> {
+    /// What of a candidate it looks at, where that is one of a few quantities that many candidates are asked for at
+    /// once.
+    fn quantity(&self) -> Option<Quantity> {
         None
     }
+}
+
+/// What of a candidate a criterion may look at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Quantity {
+    /// The gain is a decrease of entropy.
+    Entropy(EntropyOf),
+    /// The gain is the decrease of the trace of the covariance of `X` and `Y`, each row and column times its weight.
+    CovarianceTrace([f64; CHAIN]),
+    /// The gain is the trace of the candidate's information on `X` and `Y`, each row and column times its weight.
+    InformationTrace([f64; CHAIN]),
+    /// The gain is [`Gain::gain_of_decrease`] of the decrease of the covariance of `X`.
+    HandEyeCovariance,
 }
 
 /// Whose entropy a criterion lowers.
@@ -47,6 +61,11 @@ pub enum EntropyOf {
 pub trait Gain: Sync {
     /// Gain of a candidate with information `factor * factor'`.
     fn gain(&self, factor: &DMatrix<f64>) -> f64;
+
+    /// Gain of a candidate that takes `decrease` off the covariance of `X`; only of criteria that look at nothing else.
+    fn gain_of_decrease(&self, _decrease: &Matrix6<f64>) -> f64 {
+        f64::NAN
+    }
 }
 
 /// Length and angle that count as equal, for criteria that depend on units.
@@ -69,6 +88,11 @@ impl Scales {
     /// Scale of parameter `i` of the chain.
     fn of(&self, i: usize) -> f64 {
         if i % 6 < 3 { self.length_m } else { self.angle_rad }
+    }
+
+    /// Scales of the chain.
+    fn all(&self) -> [f64; CHAIN] {
+        std::array::from_fn(|i| self.of(i))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3x6, Matrix6, Vector3};
 
-use super::{Criterion, Gain, hand_eye_decrease};
+use super::{Criterion, Gain, Quantity, hand_eye_decrease};
 use crate::error::Error;
 use crate::information::Belief;
 use crate::se3::hat;
@@ -71,12 +71,18 @@ impl Criterion for ToolPoint {
         let before = self.standard_deviation_m(&belief.hand_eye_covariance());
         Ok(Box::new(Prepared { criterion: self, belief, before }))
     }
+
+    fn quantity(&self) -> Option<Quantity> {
+        Some(Quantity::HandEyeCovariance)
+    }
 }
 
 impl Gain for Prepared<'_> {
     fn gain(&self, factor: &DMatrix<f64>) -> f64 {
-        hand_eye_decrease(self.belief.covariance(), factor).map_or(f64::NAN, |d| {
-            self.before - self.criterion.standard_deviation_m(&(self.belief.hand_eye_covariance() - d))
-        })
+        hand_eye_decrease(self.belief.covariance(), factor).map_or(f64::NAN, |d| self.gain_of_decrease(&d))
+    }
+
+    fn gain_of_decrease(&self, decrease: &Matrix6<f64>) -> f64 {
+        self.before - self.criterion.standard_deviation_m(&(self.belief.hand_eye_covariance() - decrease))
     }
 }

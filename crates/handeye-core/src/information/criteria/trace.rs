@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Criterion, Gain, Scales, covariance_decrease};
+use super::{Criterion, Gain, Quantity, Scales, covariance_decrease};
 use crate::error::Error;
 use crate::information::Belief;
 use crate::information::belief::CHAIN;
@@ -23,6 +23,10 @@ impl Criterion for Trace {
 
     fn prepare<'a>(&'a self, belief: &'a Belief) -> Result<Box<dyn Gain + 'a>, Error> {
         Ok(Box::new(Prepared(self, belief)))
+    }
+
+    fn quantity(&self) -> Option<Quantity> {
+        Some(Quantity::CovarianceTrace(self.scales.all().map(|scale| 1.0 / scale)))
     }
 }
 

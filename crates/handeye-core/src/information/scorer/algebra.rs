@@ -1,26 +1,11 @@
-//! Determinants of six-dimensional measurements, lanes = candidates.
+//! Determinants of six-dimensional measurements, lanes = candidates; everything unrolled.
 
-use super::block::{BLOCK, Block, UPPER, load, upper};
+use super::block::{BLOCK, Block, Row, UPPER, load, upper};
+use super::forms::{Form, Moved};
 use crate::simd::{Kernel, Simd, Vector, ln};
 
-/// `S = constant + U U'` with `U = offset + Ad(X A) root`: a covariance of the camera-frame twist.
-pub(super) struct Form {
-    /// Symmetric, upper triangle row by row.
-    pub constant: [f64; UPPER],
-    /// The part that the motion moves; none if it moves nothing.
-    pub moved: Option<Moved>,
-}
-
-/// `U = offset + Ad(X A) root`.
-pub(super) struct Moved {
-    /// 6 x 6, row by row.
-    pub offset: [[f64; 6]; 6],
-    /// Lower triangle, 6 x 6, row by row.
-    pub root: [[f64; 6]; 6],
-}
-
-/// Pivots of an information below this fraction of their diagonal are rounding.
-pub(super) const NULL_PIVOT: f64 = 1e-13;
+/// Pivots of a covariance below this fraction of their diagonal are rounding.
+pub(super) const NULL_PIVOT: f64 = 1e-15;
 
 /// Does the body for each of the indices, each a constant.
 macro_rules! each {
@@ -32,12 +17,12 @@ macro_rules! each {
     };
 }
 
-/// `|I + scale M S|` of a block, for `M` the information in it.
+/// `|I + scale M S|` of a block, for `M` the information in it, of the twist alone.
 pub(super) struct Determinant<'a> {
     pub scale: f64,
     pub form: &'a Form,
     pub block: &'a Block,
-    pub out: &'a mut [f64; BLOCK],
+    pub out: &'a mut Row,
 }
 
 impl Kernel for Determinant<'_> {
@@ -54,8 +39,11 @@ impl Kernel for Determinant<'_> {
                 let u = spread(simd, moved, &load(simd, &self.block.before_y, at));
                 add_square(&u, &mut s);
             }
-            let m = load(simd, &self.block.information, at);
-            determinant(simd, m, simd.splat(self.scale), s).store(&mut self.out[at..]);
+            let mut m = [simd.splat(0.0); UPPER];
+            for (to, from) in m.iter_mut().zip(&self.block.information) {
+                *to = simd.load(&from[at..]);
+            }
+            determinant(simd, s, simd.splat(self.scale), m).store(&mut self.out[at..]);
         }
     }
 }
@@ -63,7 +51,7 @@ impl Kernel for Determinant<'_> {
 /// `U = offset + Ad(T) root`, with `Ad(T) = [R, [t]R; 0, R]`.
 #[expect(clippy::reversed_empty_ranges, reason = "unrolled: the last steps have nothing left to do")]
 #[inline(always)]
-fn spread<S: Simd>(simd: S, moved: &Moved, t: &[S::Vector; 12]) -> [[S::Vector; 6]; 6] {
+pub(super) fn spread<S: Simd>(simd: S, moved: &Moved, t: &[S::Vector; 12]) -> [[S::Vector; 6]; 6] {
     let zero = simd.splat(0.0);
     let mut u = [[zero; 6]; 6];
     macro_rules! rotated {
@@ -101,7 +89,7 @@ fn spread<S: Simd>(simd: S, moved: &Moved, t: &[S::Vector; 12]) -> [[S::Vector; 
 
 /// Adds `U U'` to a symmetric matrix.
 #[inline(always)]
-fn add_square<V: Vector>(u: &[[V; 6]; 6], s: &mut [V; UPPER]) {
+pub(super) fn add_square<V: Vector>(u: &[[V; 6]; 6], s: &mut [V; UPPER]) {
     each!(I in [0 1 2 3 4 5] {
         for j in I..6 {
             let mut sum = s[upper(I, j)];
@@ -115,58 +103,57 @@ fn add_square<V: Vector>(u: &[[V; 6]; 6], s: &mut [V; UPPER]) {
 
 /// `|I + scale M S|`.
 ///
-/// `M = L D L'` is taken as six scalar measurements with directions `l_k` and informations `d_k`; each in turn
-/// multiplies the determinant by `p = 1 + d l' S l` and leaves the covariance `S - (d / p) S l l' S`. Every factor is
-/// at least one, whatever null directions `M` has.
+/// `S = L D L'` is taken as six scalar causes of the measurement with directions `l_k` and variances `d_k`; each in turn
+/// multiplies the determinant by `p = 1 + d l' M l` and leaves the information `M - (d / p) M l l' M` for the others.
+/// `M` may be singular, and every factor is at least one.
 #[expect(clippy::reversed_empty_ranges, reason = "unrolled: the last steps have nothing left to do")]
 #[inline(always)]
 fn determinant<S: Simd>(
     simd: S,
-    mut m: [S::Vector; UPPER],
-    scale: S::Vector,
     mut s: [S::Vector; UPPER],
+    scale: S::Vector,
+    mut m: [S::Vector; UPPER],
 ) -> S::Vector {
     let zero = simd.splat(0.0);
     let one = simd.splat(1.0);
-    let floor = simd.splat(NULL_PIVOT);
-    let mut limits = [zero; 6];
-    each!(K in [0 1 2 3 4 5] { limits[K] = floor * m[upper(K, K)]; });
+    let mut floors = [zero; 6];
+    each!(K in [0 1 2 3 4 5] { floors[K] = simd.splat(NULL_PIVOT) * s[upper(K, K)]; });
     let mut product = one;
     each!(K in [0 1 2 3 4 5] {
-        // Pivot and column of the factorisation of M.
-        let pivot = m[upper(K, K)];
-        let counts = pivot.greater(limits[K]);
+        // Pivot and column of the factorisation of S.
+        let pivot = s[upper(K, K)];
+        let counts = pivot.greater(floors[K]);
         let inverse = (one / pivot).keep(counts);
         let d = (pivot * scale).keep(counts);
         let mut l = [zero; 6];
         for i in K + 1..6 {
-            l[i] = m[upper(K, i)] * inverse;
+            l[i] = s[upper(K, i)] * inverse;
         }
         for i in K + 1..6 {
             for j in i..6 {
-                m[upper(i, j)] = l[i].neg_mul_add(m[upper(K, j)], m[upper(i, j)]);
+                s[upper(i, j)] = l[i].neg_mul_add(s[upper(K, j)], s[upper(i, j)]);
             }
         }
-        // S l, and l' S l.
+        // M l, and l' M l.
         let mut v = [zero; 6];
         for i in K..6 {
-            let mut sum = s[upper(i, K)];
+            let mut sum = m[upper(i, K)];
             for j in K + 1..6 {
-                sum = s[upper(i, j)].mul_add(l[j], sum);
+                sum = m[upper(i, j)].mul_add(l[j], sum);
             }
             v[i] = sum;
         }
-        let mut variance = v[K];
+        let mut information = v[K];
         for i in K + 1..6 {
-            variance = l[i].mul_add(v[i], variance);
+            information = l[i].mul_add(v[i], information);
         }
-        let factor = d.mul_add(variance, one);
+        let factor = d.mul_add(information, one);
         product = product * factor;
         let weight = d / factor;
         for i in K + 1..6 {
             let weighted = v[i] * weight;
             for j in i..6 {
-                s[upper(i, j)] = weighted.neg_mul_add(v[j], s[upper(i, j)]);
+                m[upper(i, j)] = weighted.neg_mul_add(v[j], m[upper(i, j)]);
             }
         }
     });
@@ -178,7 +165,7 @@ pub(super) struct Gains<'a> {
     pub block: &'a Block,
     pub fewest: f64,
     pub compared: bool,
-    pub out: &'a mut [f64; BLOCK],
+    pub out: &'a mut Row,
 }
 
 impl Kernel for Gains<'_> {

@@ -26,8 +26,8 @@ pub(super) struct Block {
     pub before_y: Transforms,
     /// `T_camera_target = X A Y`.
     pub pose: Transforms,
-    /// Information of the camera-frame twist, up to a factor common to all candidates.
-    pub information: [Row; UPPER],
+    /// Information of `[eta; c]`, upper triangle row by row, up to a factor common to all candidates.
+    pub information: Vec<Row>,
     /// Features in sight.
     pub seen: Row,
     /// `|I + M S|`.
@@ -37,16 +37,23 @@ pub(super) struct Block {
 }
 
 impl Block {
-    pub fn new() -> Self {
+    /// For informations of `size` rows.
+    pub fn new(size: usize) -> Self {
         const ZERO: Row = [0.0; BLOCK];
         Self {
             before_y: [ZERO; 12],
             pose: [ZERO; 12],
-            information: [ZERO; UPPER],
+            information: vec![ZERO; size * (size + 1) / 2],
             seen: ZERO,
             with: ZERO,
             without: ZERO,
         }
+    }
+
+    /// The information where the twist is all there is.
+    #[inline(always)]
+    pub fn of_twist(&mut self) -> &mut [Row; UPPER] {
+        self.information.first_chunk_mut().expect("a block has room for six rows")
     }
 }
 

@@ -4,7 +4,7 @@
 //! `[A w, B w, -s w, -(y s + B), A + x s, B x - A y]`, `s = x A + y B`.
 
 use super::block::{BLOCK, Block, UPPER, load, store, upper};
-use super::pinhole::Window;
+use super::lens::{Window, bend};
 use super::target::Target;
 use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
 use crate::simd::{Kernel, Simd, Vector};
@@ -29,7 +29,7 @@ impl<const RATIONAL: bool, const PRISM: bool> Kernel for Distorted<'_, RATIONAL,
             let pose = load(simd, &self.block.pose, at);
             let (information, seen) =
                 sum::<S, RATIONAL, PRISM>(simd, self.parameters, self.window, self.target, &pose);
-            store(&information, &mut self.block.information, at);
+            store(&information, self.block.of_twist(), at);
             seen.store(&mut self.block.seen[at..]);
         }
     }
@@ -59,14 +59,7 @@ fn sum<S: Simd, const RATIONAL: bool, const PRISM: bool>(
             let x = pose[0].mul_add(along, start_x) * w;
             let y = pose[3].mul_add(along, start_y) * w;
             let bent = bend::<S, RATIONAL, PRISM>(simd, parameters, x, y);
-            let determinant = bent.cross_y.neg_mul_add(bent.cross_x, bent.along_x * bent.along_y);
-            let in_sight = depth.greater(simd.splat(MIN_DEPTH_M))
-                & simd.splat(window.max_squared_radius).at_least(bent.squared_radius)
-                & determinant.greater(zero)
-                & bent.x.at_least(simd.splat(window.x[0]))
-                & simd.splat(window.x[1]).at_least(bent.x)
-                & bent.y.at_least(simd.splat(window.y[0]))
-                & simd.splat(window.y[1]).at_least(bent.y);
+            let in_sight = bent.in_sight(simd, window) & depth.greater(simd.splat(MIN_DEPTH_M));
             seen = seen + one.keep(in_sight);
             let (w, x, y) = (w.keep(in_sight), x.keep(in_sight), y.keep(in_sight));
             let aspect = simd.splat(parameters[1] / parameters[0]);
@@ -92,67 +85,4 @@ fn sum<S: Simd, const RATIONAL: bool, const PRISM: bool>(
         }
     }
     (sums, seen)
-}
-
-/// A point after the lens and the derivatives `[along_x, cross_x; cross_y, along_y]`.
-struct Bent<V> {
-    x: V,
-    y: V,
-    squared_radius: V,
-    along_x: V,
-    cross_x: V,
-    cross_y: V,
-    along_y: V,
-}
-
-/// As `camera::brown_conrady::bend`.
-#[inline(always)]
-fn bend<S: Simd, const RATIONAL: bool, const PRISM: bool>(
-    simd: S,
-    p: &[f64; MAX_PARAMETERS],
-    x: S::Vector,
-    y: S::Vector,
-) -> Bent<S::Vector> {
-    let (xx, yy, xy) = (x * x, y * y, x * y);
-    let s = xx + yy;
-    let (mut radial, mut twice_slope) = cubic(simd, [p[4], p[5], p[8]], s);
-    if RATIONAL {
-        let (denominator, twice_rise) = cubic(simd, [p[9], p[10], p[11]], s);
-        let inverse = simd.splat(1.0) / denominator;
-        radial = radial * inverse;
-        twice_slope = radial.neg_mul_add(twice_rise, twice_slope) * inverse;
-    }
-    let (p1, p2) = (simd.splat(2.0 * p[6]), simd.splat(2.0 * p[7]));
-    let (half_p1, half_p2) = (simd.splat(p[6]), simd.splat(p[7]));
-    let cross = xy.mul_add(twice_slope, p1.mul_add(x, p2 * y));
-    let two = simd.splat(2.0);
-    let mut bent = Bent {
-        x: x.mul_add(radial, p1.mul_add(xy, half_p2 * two.mul_add(xx, s))),
-        y: y.mul_add(radial, p2.mul_add(xy, half_p1 * two.mul_add(yy, s))),
-        squared_radius: s,
-        along_x: xx.mul_add(twice_slope, p1.mul_add(y, simd.splat(6.0 * p[7]).mul_add(x, radial))),
-        cross_x: cross,
-        cross_y: cross,
-        along_y: yy.mul_add(twice_slope, p2.mul_add(x, simd.splat(6.0 * p[6]).mul_add(y, radial))),
-    };
-    if PRISM {
-        let (s1, s2, s3, s4) = (p[12], p[13], p[14], p[15]);
-        bent.x = simd.splat(s2).mul_add(s, simd.splat(s1)).mul_add(s, bent.x);
-        bent.y = simd.splat(s4).mul_add(s, simd.splat(s3)).mul_add(s, bent.y);
-        let along_x = simd.splat(4.0 * s2).mul_add(s, simd.splat(2.0 * s1));
-        let along_y = simd.splat(4.0 * s4).mul_add(s, simd.splat(2.0 * s3));
-        bent.along_x = along_x.mul_add(x, bent.along_x);
-        bent.cross_x = along_x.mul_add(y, bent.cross_x);
-        bent.cross_y = along_y.mul_add(x, bent.cross_y);
-        bent.along_y = along_y.mul_add(y, bent.along_y);
-    }
-    bent
-}
-
-/// `1 + c1 s + c2 s^2 + c3 s^3` and twice its derivative.
-#[inline(always)]
-fn cubic<S: Simd>(simd: S, c: [f64; 3], s: S::Vector) -> (S::Vector, S::Vector) {
-    let value = simd.splat(c[2]).mul_add(s, simd.splat(c[1])).mul_add(s, simd.splat(c[0]));
-    let slope = simd.splat(6.0 * c[2]).mul_add(s, simd.splat(4.0 * c[1])).mul_add(s, simd.splat(2.0 * c[0]));
-    (value.mul_add(s, simd.splat(1.0)), slope)
 }

@@ -1,115 +1,251 @@
-//! The covariances that an entropy gain compares, as the algebra wants them.
+//! The covariances that a gain is made of, as the algebra wants them.
 //!
-//! With `C = Ad(X A)` the camera-frame twist of a candidate is `eta = xi_x + C xi_y`. With information `M` of the view
-//! and covariance `S_r` of the robot's error in the camera frame, the view tells `M_eff = (M^-1 + S_r)^-1`, and
+//! With `C = Ad(X A)` the camera-frame twist of a candidate is `eta = xi_x + C xi_y`; beside it stand the pixel
+//! parameters c. With information `N` of the view in `[eta; c]` and covariance `S_r` of the robot's error in the
+//! camera frame, the view tells `N_eff = (N^-1 + S_r)^-1`, and with `S` the covariance of `[eta; c]` before it
 //!
 //! ```text
-//! |I + M_eff S| = |I + M (S + S_r)| / |I + M S_r|
+//! |I + N_eff S| = |I + N (S + S_r)| / |I + N S_r|
+//! Z (N_eff^-1 + S)^-1 Z' = Z (N^-1 + S + S_r)^-1 Z'
 //! ```
 //!
-//! so that an entropy gain is half the logarithm of a quotient of two determinants. `S` is written as
-//! `S_0 + (K + C G)(K + C G)'` with `G G'` the covariance of `xi_y`: where `xi_x` and `C xi_y` cancel, as they do in a
-//! good calibration, they cancel before they are squared.
+//! so that an entropy gain is half the logarithm of a quotient of two determinants, and what a view takes off a
+//! covariance needs no `N_eff`. `S` is written as `constant + U U'` with `U = [K + C G; K_c]` and `G G'` the covariance
+//! of `xi_y`: where `xi_x` and `C xi_y` cancel, as they do in a good calibration, they cancel before they are squared.
 
 use nalgebra::{DMatrix, Matrix6};
 
-use super::algebra::{Form, Moved};
-use super::block::{UPPER, upper};
 use crate::error::Error;
 use crate::information::belief::{Belief, CHAIN, invert};
-use crate::information::candidate::semidefinite_root;
 use crate::information::criteria::EntropyOf;
 use crate::least_squares::Side;
 use crate::se3::Se3;
 
-/// `1/2 ln (|I + M with| / |I + M without|)`.
-pub(super) struct Forms {
+/// Where entry `(i, j)`, `i <= j`, of a symmetric matrix of `size` rows lies in its upper triangle, row by row.
+pub(super) const fn packed(size: usize, i: usize, j: usize) -> usize {
+    i * size - i * (i + 1) / 2 + j
+}
+
+/// A covariance of `[eta; c]`: `constant + U U'`.
+pub(super) struct Form {
+    /// Six and the number of pixel parameters.
+    pub size: usize,
+    /// Symmetric, upper triangle row by row.
+    pub constant: Vec<f64>,
+    /// The part that the motion moves; none if it moves nothing.
+    pub moved: Option<Box<Moved>>,
+}
+
+/// `U = [offset + C root; pixel]`, but for the constant `pixel pixel'`.
+pub(super) struct Moved {
+    /// 6 x 6, row by row.
+    pub offset: [[f64; 6]; 6],
+    /// Lower triangle, 6 x 6, row by row.
+    pub root: [[f64; 6]; 6],
+    /// One row per pixel parameter.
+    pub pixel: Vec<[f64; 6]>,
+}
+
+/// How parameters of interest go with `[eta; c]`, one row each: `Z = constant + [of_y C', 0]`.
+pub(super) struct Observed {
+    /// `[eta; c]` columns.
+    pub constant: Vec<Vec<f64>>,
+    pub of_y: Vec<[f64; 6]>,
+}
+
+/// `1/2 ln (|I + N with| / |I + N without|)`.
+pub(super) struct Entropies {
     pub with: Form,
     pub without: Option<Form>,
 }
 
-impl Forms {
-    /// The gain in the entropy of everything or of the hand-eye alone, for a belief of `X` and `Y` only.
+/// The robot's error in the camera frame, `left + C right right' C'`.
+struct RobotNoise {
+    left: Matrix6<f64>,
+    right: Option<Matrix6<f64>>,
+}
+
+impl RobotNoise {
+    fn new(x: &Se3, robot: Option<&(Side, Matrix6<f64>)>) -> Self {
+        match robot {
+            None => Self { left: Matrix6::zeros(), right: None },
+            Some((Side::Left, root)) => Self { left: square(&(x.adjoint() * root)), right: None },
+            Some((Side::Right, root)) => Self { left: Matrix6::zeros(), right: Some(*root) },
+        }
+    }
+
+    /// `S_r`, padded with zeros for the pixel parameters.
+    fn form(&self, size: usize) -> Form {
+        let mut covariance = DMatrix::zeros(size, size);
+        if let Some(root) = &self.right {
+            covariance.view_mut((0, 0), (6, 6)).copy_from(&square(root));
+        }
+        without_chain(&covariance, &self.left)
+    }
+}
+
+impl Entropies {
+    /// The gain in the entropy of everything or of the hand-eye alone.
     pub fn new(
         belief: &Belief,
         of: EntropyOf,
+        pixel_parameters: usize,
         x: &Se3,
         robot: Option<&(Side, Matrix6<f64>)>,
     ) -> Result<Self, Error> {
-        debug_assert_eq!(belief.len(), CHAIN);
-        let left = match robot {
-            Some((Side::Left, root)) => square(&(x.adjoint() * root)),
-            _ => Matrix6::zeros(),
-        };
-        let right = match robot {
-            Some((Side::Right, root)) => Some(root),
-            _ => None,
-        };
-        let with = total(belief, &left, right)?;
-        let right = right.map_or_else(Matrix6::zeros, square);
+        let size = 6 + pixel_parameters;
+        let noise = RobotNoise::new(x, robot);
         let without = match (of, robot) {
             (EntropyOf::Everything, None) => None,
-            (EntropyOf::Everything, Some(_)) => Some(part(&left, &right)),
+            (EntropyOf::Everything, Some(_)) => Some(noise.form(size)),
             (EntropyOf::HandEye, _) => {
-                let target = conditional(belief, 6)?;
-                Some(part(&left, &(target + right)))
+                let (nuisance, _) = belief
+                    .nuisance()
+                    .ok_or_else(|| Error::degenerate("the information of the target's pose is singular"))?;
+                let mut of_rest = nuisance.view((0, 0), (size, size)).into_owned();
+                if let Some(root) = &noise.right {
+                    let mut of_y = of_rest.view_mut((0, 0), (6, 6));
+                    of_y += square(root);
+                }
+                Some(without_chain(&of_rest, &noise.left))
             }
         };
-        Ok(Self { with, without })
+        Ok(Self { with: predicted(belief, pixel_parameters, x, robot)?, without })
     }
+}
+
+/// `S + S_r`: the covariance of what a view measures.
+pub(super) fn predicted(
+    belief: &Belief,
+    pixel_parameters: usize,
+    x: &Se3,
+    robot: Option<&(Side, Matrix6<f64>)>,
+) -> Result<Form, Error> {
+    let singular = || Error::degenerate("the covariance of the target's pose is singular");
+    let noise = RobotNoise::new(x, robot);
+    let covariance = belief.covariance();
+    let chain = covariance.view((0, 0), (CHAIN, CHAIN)).into_owned();
+    let (information, _) = invert(&chain).ok_or_else(singular)?;
+    let (conditional, _) = invert(&information.view((0, 0), (6, 6)).into_owned()).ok_or_else(singular)?;
+    let mut of_y: Matrix6<f64> = covariance.fixed_view::<6, 6>(6, 6).into_owned();
+    let cross: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 6).into_owned();
+    let mut of_eta = Matrix6::from_column_slice(conditional.as_slice()) + noise.left;
+    if let Some(root) = &noise.right {
+        // What noise on the right leaves of the correlation: S_xy (S_yy^-1 - (S_yy + R R')^-1) S_yx.
+        let weighted = of_y.cholesky().ok_or_else(singular)?.solve(root);
+        let inner = (Matrix6::identity() + root.transpose() * weighted).cholesky().ok_or_else(singular)?;
+        let lost = inner.l().solve_lower_triangular(&(cross * weighted).transpose()).ok_or_else(singular)?;
+        of_eta += lost.transpose() * lost;
+        of_y += square(root);
+    }
+    let root = of_y.cholesky().ok_or_else(singular)?.l();
+    let offset = root.solve_lower_triangular(&cross.transpose()).ok_or_else(singular)?.transpose();
+    let with_y = covariance.view((6, CHAIN), (6, pixel_parameters)).into_owned();
+    let pixel = root.solve_lower_triangular(&with_y).ok_or_else(singular)?.transpose();
+
+    let size = 6 + pixel_parameters;
+    let mut constant = DMatrix::zeros(size, size);
+    constant.view_mut((0, 0), (6, 6)).copy_from(&of_eta);
+    let with_x = covariance.view((0, CHAIN), (6, pixel_parameters));
+    constant.view_mut((0, 6), (6, pixel_parameters)).copy_from(&(with_x - offset * pixel.transpose()));
+    constant
+        .view_mut((6, 6), (pixel_parameters, pixel_parameters))
+        .copy_from(&covariance.view((CHAIN, CHAIN), (pixel_parameters, pixel_parameters)));
+    Ok(form(&constant, Some((&offset, &root, &pixel))))
+}
+
+/// The same with `xi_x` known: `of_rest` is the covariance of `[xi_y; c]`, `left` that of the robot's error.
+fn without_chain(of_rest: &DMatrix<f64>, left: &Matrix6<f64>) -> Form {
+    let size = of_rest.nrows();
+    let mut constant = of_rest.clone();
+    constant.view_mut((0, 0), (6, size)).fill(0.0);
+    constant.view_mut((0, 0), (6, 6)).copy_from(left);
+    let of_y = of_rest.view((0, 0), (6, 6)).into_owned();
+    if of_y.iter().all(|x| *x == 0.0) {
+        return form(&constant, None);
+    }
+    // Null columns of the root go with nothing.
+    let root = lower_root(of_y);
+    let mut pixel = of_rest.view((6, 0), (size - 6, 6)).into_owned();
+    for j in 0..6 {
+        for i in 0..size - 6 {
+            let before: f64 = (0..j).map(|k| pixel[(i, k)] * root[(j, k)]).sum();
+            let pivot = root[(j, j)];
+            pixel[(i, j)] = if pivot > 0.0 { (pixel[(i, j)] - before) / pivot } else { 0.0 };
+        }
+    }
+    let root = Matrix6::from_column_slice(root.as_slice());
+    form(&constant, Some((&Matrix6::zeros(), &root, &pixel)))
+}
+
+fn form(constant: &DMatrix<f64>, moved: Option<(&Matrix6<f64>, &Matrix6<f64>, &DMatrix<f64>)>) -> Form {
+    let size = constant.nrows();
+    let rows = |m: &Matrix6<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
+    Form {
+        size,
+        constant: (0..size).flat_map(|i| (i..size).map(move |j| constant[(i, j)])).collect(),
+        moved: moved.map(|(offset, root, pixel)| {
+            Box::new(Moved {
+                offset: rows(offset),
+                root: rows(root),
+                pixel: (0..size - 6).map(|i| std::array::from_fn(|j| pixel[(i, j)])).collect(),
+            })
+        }),
+    }
+}
+
+/// `L` with `L L' = m` for a positive semi-definite `m`: Cholesky that leaves null columns zero.
+fn lower_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
+    let n = m.nrows();
+    let floor: Vec<f64> = (0..n).map(|i| 1e-13 * m[(i, i)].abs()).collect();
+    for j in 0..n {
+        let pivot = m[(j, j)];
+        let inverse = if pivot > floor[j] && pivot > 0.0 { 1.0 / pivot.sqrt() } else { 0.0 };
+        for i in j..n {
+            m[(i, j)] *= inverse;
+        }
+        for k in j + 1..n {
+            let f = m[(k, j)];
+            for i in k..n {
+                m[(i, k)] -= m[(i, j)] * f;
+            }
+        }
+        for i in 0..j {
+            m[(i, j)] = 0.0;
+        }
+    }
+    m
 }
 
 fn square(root: &Matrix6<f64>) -> Matrix6<f64> {
     root * root.transpose()
 }
 
-/// Covariance of six parameters, from `at` on, if all others were known.
-fn conditional(belief: &Belief, at: usize) -> Result<Matrix6<f64>, Error> {
-    let block = belief.information().view((at, at), (6, 6)).into_owned();
-    let (inverse, _) =
-        invert(&block).ok_or_else(|| Error::degenerate("a block of the information is singular"))?;
-    Ok(Matrix6::from_column_slice(inverse.as_slice()))
-}
-
-/// `S + S_r`.
-fn total(belief: &Belief, left: &Matrix6<f64>, right: Option<&Matrix6<f64>>) -> Result<Form, Error> {
-    let singular = || Error::degenerate("the covariance of the target's pose is singular");
-    let covariance = belief.covariance();
-    let cross: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 6).into_owned();
-    let mut of_y: Matrix6<f64> = covariance.fixed_view::<6, 6>(6, 6).into_owned();
-    let mut constant = conditional(belief, 0)? + left;
-    if let Some(root) = right {
-        // What robot noise on the right leaves of the correlation: S_xy (S_yy^-1 - (S_yy + R R')^-1) S_yx.
-        let weighted = of_y.cholesky().ok_or_else(singular)?.solve(root);
-        let inner = (Matrix6::identity() + root.transpose() * weighted).cholesky().ok_or_else(singular)?;
-        let lost = inner.l().solve_lower_triangular(&(cross * weighted).transpose()).ok_or_else(singular)?;
-        constant += lost.transpose() * lost;
-        of_y += square(root);
-    }
-    let root = of_y.cholesky().ok_or_else(singular)?.l();
-    let offset = root.solve_lower_triangular(&cross.transpose()).ok_or_else(singular)?.transpose();
-    Ok(form(&constant, Some((&offset, &root))))
-}
-
-/// `constant + C of_y C'`.
-fn part(constant: &Matrix6<f64>, of_y: &Matrix6<f64>) -> Form {
-    if *of_y == Matrix6::zeros() {
-        return form(constant, None);
-    }
-    let root = semidefinite_root(DMatrix::from_column_slice(6, 6, of_y.as_slice()));
-    form(constant, Some((&Matrix6::zeros(), &Matrix6::from_column_slice(root.as_slice()))))
-}
-
-fn form(constant: &Matrix6<f64>, moved: Option<(&Matrix6<f64>, &Matrix6<f64>)>) -> Form {
-    let rows = |m: &Matrix6<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
-    let mut packed = [0.0; UPPER];
-    for i in 0..6 {
-        for j in i..6 {
-            packed[upper(i, j)] = 0.5 * (constant[(i, j)] + constant[(j, i)]);
+impl Observed {
+    /// The covariance of the first parameters of the chain with `[eta; c]`, each row times its weight.
+    pub fn covariance(belief: &Belief, pixel_parameters: usize, weights: &[f64]) -> Self {
+        let covariance = belief.covariance();
+        let entry = |i: usize, j: usize| covariance[(i, j)] * weights[i];
+        let columns = || (0..6).chain(CHAIN..CHAIN + pixel_parameters);
+        Self {
+            constant: (0..weights.len()).map(|i| columns().map(|j| entry(i, j)).collect()).collect(),
+            of_y: (0..weights.len()).map(|i| std::array::from_fn(|j| entry(i, 6 + j))).collect(),
         }
     }
-    Form {
-        constant: packed,
-        moved: moved.map(|(offset, root)| Moved { offset: rows(offset), root: rows(root) }),
+
+    /// `B' = [I, C]'`, each row times its weight: with it and no belief, what a view tells of the chain itself.
+    pub fn information(pixel_parameters: usize, weights: &[f64; CHAIN]) -> Self {
+        let unit = |i: usize, j: usize| if i == j { weights[i] } else { 0.0 };
+        Self {
+            constant: (0..CHAIN)
+                .map(|i| (0..6 + pixel_parameters).map(|j| if j < 6 { unit(i, j) } else { 0.0 }).collect())
+                .collect(),
+            of_y: (0..CHAIN).map(|i| std::array::from_fn(|j| unit(i, 6 + j))).collect(),
+        }
     }
+}
+
+/// What the robot's error alone makes of a view.
+pub(super) fn robot_only(pixel_parameters: usize, x: &Se3, robot: Option<&(Side, Matrix6<f64>)>) -> Form {
+    RobotNoise::new(x, robot).form(6 + pixel_parameters)
 }

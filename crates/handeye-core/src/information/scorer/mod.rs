@@ -1,8 +1,9 @@
-//! Entropy gains of many candidates at once, lanes = candidates.
+//! Gains of many candidates at once, lanes = candidates.
 //!
-//! A block of candidates goes through four stages, each a kernel compiled for every vector unit: motions to poses
-//! (`approach`), points to 6 x 6 information (`pinhole`, `distorted`, or feature by feature for circles and fisheyes),
-//! information to determinants (`algebra`, over the covariances of `forms`), determinants to gains.
+//! A block of candidates goes through stages, each a kernel compiled for every vector unit: motions to poses
+//! (`approach`), points to information (`pinhole`, `distorted`, `wide_points`, or feature by feature for circles and
+//! fisheyes), information to determinants or decreases of a covariance (`algebra`, `wide_algebra`, over the covariances
+//! of `forms`), and these to gains.
 
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 
@@ -11,25 +12,32 @@ mod approach;
 mod block;
 mod distorted;
 mod forms;
+mod lens;
 mod pinhole;
 mod target;
 #[cfg(test)]
 mod tests;
+mod wide_algebra;
+mod wide_points;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3};
 
 use self::algebra::{Determinant, Gains};
 use self::approach::{Approach, MATRIX, entries};
-use self::block::{BLOCK, Block, upper};
+use self::block::{BLOCK, Block, Row, UPPER, upper};
 use self::distorted::Distorted;
-use self::forms::Forms;
-use self::pinhole::{Pinhole, Window};
+use self::forms::{Entropies, Form, Observed, packed, predicted, robot_only};
+use self::lens::Window;
+use self::pinhole::Pinhole;
 use self::target::Target;
+use self::wide_algebra::{Outcome, Wide};
+use self::wide_points::{Column, WidePoints};
 use super::belief::Belief;
-use super::candidate::{CandidateModel, Execution, Motions};
-use super::criteria::EntropyOf;
+use super::candidate::{CandidateModel, Execution, Motions, Sums};
+use super::criteria::{Gain, Quantity};
 use crate::camera::{Camera, Lens};
 use crate::error::Error;
+use crate::least_squares::PixelParameters;
 use crate::se3::Se3;
 use crate::simd::{VectorUnit, dispatch};
 
@@ -38,29 +46,53 @@ pub(super) struct Scorer<'a> {
     model: &'a CandidateModel<'a>,
     x: [f64; 12],
     y: [f64; 12],
-    forms: Forms,
+    goal: Goal<'a>,
     /// Present where lanes can do the points.
     lanes: Option<(Window, Target)>,
-    fewest: f64,
+    columns: Vec<Column>,
     unit: VectorUnit,
+}
+
+/// What makes a gain.
+enum Goal<'a> {
+    Entropy(Entropies),
+    Trace(Form, Observed),
+    HandEye(Form, Observed, Box<dyn Gain + 'a>),
 }
 
 impl<'a> Scorer<'a> {
     pub fn new(
         model: &'a CandidateModel<'a>,
-        belief: &Belief,
-        of: EntropyOf,
+        belief: &'a Belief,
+        quantity: &Quantity,
+        gain: Box<dyn Gain + 'a>,
         unit: VectorUnit,
     ) -> Result<Self, Error> {
+        let columns = model.pixel_parameters.map_or_else(Vec::new, columns);
+        let (count, x, robot) = (columns.len(), &model.x, model.robot.as_ref());
+        let goal = match quantity {
+            Quantity::Entropy(of) => Goal::Entropy(Entropies::new(belief, *of, count, x, robot)?),
+            Quantity::CovarianceTrace(weights) => {
+                Goal::Trace(predicted(belief, count, x, robot)?, Observed::covariance(belief, count, weights))
+            }
+            Quantity::InformationTrace(weights) => {
+                Goal::Trace(robot_only(count, x, robot), Observed::information(count, weights))
+            }
+            Quantity::HandEyeCovariance => Goal::HandEye(
+                predicted(belief, count, x, robot)?,
+                Observed::covariance(belief, count, &[1.0; 6]),
+                gain,
+            ),
+        };
         let target =
             if model.camera.lens == Lens::KannalaBrandt { None } else { Target::new(model.features) };
         Ok(Self {
             model,
             x: entries(&model.x),
             y: entries(&model.y),
-            forms: Forms::new(belief, of, &model.x, model.robot.as_ref())?,
+            goal,
             lanes: target.map(|target| (window(model), target)),
-            fewest: model.sight.fewest.max(1) as f64,
+            columns,
             unit,
         })
     }
@@ -89,7 +121,8 @@ impl<'a> Scorer<'a> {
     }
 
     fn score_in_turn(&self, motions: Motions<'_>, gains: &mut [f64]) -> Result<(), Error> {
-        let mut block = Box::new(Block::new());
+        let mut block = Box::new(Block::new(self.size()));
+        let mut sums = self.model.sums();
         let mut padded = [0.0; BLOCK * MATRIX];
         let mut out = [0.0; BLOCK];
         for (i, gains) in gains.chunks_mut(BLOCK).enumerate() {
@@ -102,11 +135,16 @@ impl<'a> Scorer<'a> {
                 }
             };
             self.approach(matrices, &mut block)?;
-            self.inform(&mut block);
+            self.inform(&mut block, &mut sums);
             self.weigh(&mut block, &mut out);
             gains.copy_from_slice(&out[..gains.len()]);
         }
         Ok(())
+    }
+
+    /// Rows of a candidate's information.
+    fn size(&self) -> usize {
+        6 + self.columns.len()
     }
 
     fn approach(&self, matrices: &[f64], block: &mut Block) -> Result<(), Error> {
@@ -117,7 +155,7 @@ impl<'a> Scorer<'a> {
         // One by one: either says which is not rigid and why, or repairs what lanes were too strict about.
         let mut repaired = [0.0; BLOCK * MATRIX];
         for (to, from) in repaired.chunks_exact_mut(MATRIX).zip(matrices.chunks_exact(MATRIX)) {
-            let motion = Se3::from_matrix(&nalgebra::Matrix4::from_row_slice(from))?;
+            let motion = Se3::from_matrix(&Matrix4::from_row_slice(from))?;
             to.copy_from_slice(motion.to_matrix().transpose().as_slice());
         }
         if dispatch(self.unit, Approach { x, y, motions: &repaired, block }) {
@@ -127,59 +165,114 @@ impl<'a> Scorer<'a> {
     }
 
     /// Points to information.
-    fn inform(&self, block: &mut Block) {
+    fn inform(&self, block: &mut Block, sums: &mut Sums) {
         let Some((window, target)) = &self.lanes else {
-            return self.inform_one_by_one(block);
+            return self.inform_one_by_one(block, sums);
         };
         let parameters = &self.model.camera.parameters;
-        match self.model.camera.lens {
-            Lens::BrownConrady8 => {
-                dispatch(self.unit, Distorted::<true, false> { parameters, window, target, block });
-            }
-            Lens::BrownConrady12 => {
-                dispatch(self.unit, Distorted::<true, true> { parameters, window, target, block });
-            }
-            Lens::BrownConrady4 | Lens::BrownConrady5 => {
-                dispatch(self.unit, Distorted::<false, false> { parameters, window, target, block });
-            }
-            Lens::Pinhole | Lens::KannalaBrandt => {
+        macro_rules! see {
+            ($kernel:ident $(, $flag:literal)*) => {
+                dispatch(self.unit, $kernel::<$($flag),*> { parameters, window, target, block })
+            };
+        }
+        macro_rules! see_wide {
+            ($($flag:literal),*) => {{
+                let columns = &self.columns;
+                dispatch(self.unit, WidePoints::<$($flag),*> { parameters, columns, window, target, block })
+            }};
+        }
+        match (self.model.camera.lens, self.columns.is_empty()) {
+            (Lens::Pinhole | Lens::KannalaBrandt, true) => {
                 dispatch(self.unit, Pinhole { window, target, block });
             }
+            (Lens::Pinhole | Lens::KannalaBrandt, false) => see_wide!(false, false, false),
+            (Lens::BrownConrady4 | Lens::BrownConrady5, true) => see!(Distorted, false, false),
+            (Lens::BrownConrady4 | Lens::BrownConrady5, false) => see_wide!(true, false, false),
+            (Lens::BrownConrady8, true) => see!(Distorted, true, false),
+            (Lens::BrownConrady12, true) => see!(Distorted, true, true),
+            (Lens::BrownConrady8 | Lens::BrownConrady12, false) => see_wide!(true, true, true),
         }
     }
 
-    fn inform_one_by_one(&self, block: &mut Block) {
+    fn inform_one_by_one(&self, block: &mut Block, sums: &mut Sums) {
+        let size = self.size();
         for lane in 0..BLOCK {
             let pose = Se3::new(
                 Matrix3::from_fn(|i, j| block.pose[3 * i + j][lane]),
-                nalgebra::Vector3::from_fn(|i, _| block.pose[9 + i][lane]),
+                Vector3::from_fn(|i, _| block.pose[9 + i][lane]),
             );
-            let (m, seen) = self.model.information(&pose);
-            for i in 0..6 {
-                for j in i..6 {
-                    block.information[upper(i, j)][lane] = m[(i, j)];
+            block.seen[lane] = self.model.sum(&pose, sums) as f64;
+            let (twist, _) = sums.moments.finish();
+            for i in 0..size {
+                for j in i..size {
+                    block.information[packed(size, i, j)][lane] = match &sums.columns {
+                        Some(columns) if i >= 6 => columns.cc[(i - 6, j - 6)],
+                        Some(columns) if j >= 6 => columns.mc[(i, j - 6)],
+                        _ => twist[(i, j)],
+                    };
                 }
             }
-            block.seen[lane] = seen as f64;
         }
     }
 
     /// Information to gains.
-    fn weigh(&self, block: &mut Block, out: &mut [f64; BLOCK]) {
+    fn weigh(&self, block: &mut Block, out: &mut Row) {
         let mut scale = 1.0;
         if self.lanes.is_some() {
             // Lanes leave out what is common to all points.
             scale = (self.model.camera.parameters[0] / self.model.pixel_sigma).powi(2);
         }
-        let (mut with, mut without) = ([1.0; BLOCK], [1.0; BLOCK]);
-        dispatch(self.unit, Determinant { scale, form: &self.forms.with, block, out: &mut with });
-        if let Some(form) = &self.forms.without {
-            dispatch(self.unit, Determinant { scale, form, block, out: &mut without });
+        let fewest = self.model.sight.fewest.max(1) as f64;
+        match &self.goal {
+            Goal::Entropy(Entropies { with, without }) => {
+                let mut determinants = [1.0; BLOCK];
+                self.determinant(scale, with, block, &mut determinants);
+                block.with = determinants;
+                if let Some(without) = without {
+                    self.determinant(scale, without, block, &mut determinants);
+                    block.without = determinants;
+                }
+                dispatch(self.unit, Gains { block, fewest, compared: without.is_some(), out });
+            }
+            Goal::Trace(form, observed) => {
+                self.take(scale, form, block, Outcome::Trace(observed, out));
+                for (gain, seen) in out.iter_mut().zip(&block.seen) {
+                    *gain = if *seen >= fewest { *gain } else { f64::NAN };
+                }
+            }
+            Goal::HandEye(form, observed, gain) => {
+                let mut decrease = [[0.0; BLOCK]; UPPER];
+                self.take(scale, form, block, Outcome::Decrease(observed, &mut decrease));
+                for lane in 0..BLOCK {
+                    let here = Matrix6::from_fn(|i, j| decrease[upper(i, j)][lane]);
+                    let enough = block.seen[lane] >= fewest;
+                    out[lane] = if enough { gain.gain_of_decrease(&here) } else { f64::NAN };
+                }
+            }
         }
-        (block.with, block.without) = (with, without);
-        let compared = self.forms.without.is_some();
-        dispatch(self.unit, Gains { block, fewest: self.fewest, compared, out });
     }
+
+    fn determinant(&self, scale: f64, form: &Form, block: &Block, out: &mut Row) {
+        if form.size == 6 {
+            dispatch(self.unit, Determinant { scale, form, block, out });
+        } else {
+            self.take(scale, form, block, Outcome::Determinant(out));
+        }
+    }
+
+    fn take(&self, scale: f64, form: &Form, block: &Block, outcome: Outcome<'_>) {
+        if form.size <= 12 {
+            dispatch(self.unit, Wide::<12, 78> { scale, form, block, outcome });
+        } else {
+            dispatch(self.unit, Wide::<23, 276> { scale, form, block, outcome });
+        }
+    }
+}
+
+/// The pixel parameters in the order of their columns.
+fn columns(parameters: &PixelParameters) -> Vec<Column> {
+    let scale = parameters.board_scale.then_some(Column::BoardScale);
+    parameters.camera.iter().map(|i| Column::Camera(*i)).chain(scale).collect()
 }
 
 /// What of the plane at unit depth is in sight.

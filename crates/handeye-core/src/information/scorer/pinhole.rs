@@ -10,21 +10,10 @@
 //! so that every entry of their square is a sum of few monomials over the points: 23 sums in place of two times 21.
 
 use super::block::{BLOCK, Block, UPPER, load, store, upper};
+use super::lens::Window;
 use super::target::Target;
 use crate::camera::MIN_DEPTH_M;
 use crate::simd::{Kernel, Mask, Simd, Vector};
-
-/// What of a pinhole camera counts, in the plane at unit depth.
-#[derive(Clone, Copy)]
-pub(super) struct Window {
-    /// Squared ratio of the focal lengths, `(f_y / f_x)^2`.
-    pub squared_aspect: f64,
-    /// Lowest and highest x and y that count as seen.
-    pub x: [f64; 2],
-    pub y: [f64; 2],
-    /// Largest squared distance from the axis.
-    pub max_squared_radius: f64,
-}
 
 /// Sums the information, divided by `f_x^2`, of the points in sight, and counts them.
 pub(super) struct Pinhole<'a> {
@@ -45,7 +34,7 @@ impl Kernel for Pinhole<'_> {
             } else {
                 sum::<S, true>(simd, self.window, self.target, &pose)
             };
-            store(&arrange(simd, self.window.squared_aspect, &sums, seen), &mut self.block.information, at);
+            store(&arrange(simd, self.window.squared_aspect, &sums, seen), self.block.of_twist(), at);
             seen.store(&mut self.block.seen[at..]);
         }
     }

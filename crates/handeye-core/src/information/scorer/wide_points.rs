@@ -1,0 +1,198 @@
+//! The information of corners in twist and pixel parameters, lanes = candidates.
+
+use super::block::{BLOCK, Block, load};
+use super::forms::packed;
+use super::lens::{Bent, Window, bend};
+use super::target::Target;
+use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
+use crate::simd::{Kernel, Simd, Vector};
+
+/// Rows of `d pi / d [eta; c]` that are squared together: so many sums stay in registers.
+const TOGETHER: usize = 8;
+
+/// Most columns: the twist, all parameters of a lens, and the board's scale.
+const COLUMNS: usize = 6 + MAX_PARAMETERS + 1;
+
+/// A pixel parameter.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Column {
+    /// Camera parameter of this index.
+    Camera(usize),
+    /// Scale of the board about its origin.
+    BoardScale,
+}
+
+/// Sums the information, divided by `f_x^2`, of the points in sight, and counts them.
+pub(super) struct WidePoints<'a, const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool> {
+    pub parameters: &'a [f64; MAX_PARAMETERS],
+    pub columns: &'a [Column],
+    pub window: &'a Window,
+    pub target: &'a Target,
+    pub block: &'a mut Block,
+}
+
+impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool> Kernel
+    for WidePoints<'_, DISTORTED, RATIONAL, PRISM>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let zero = simd.splat(0.0);
+        let size = 6 + self.columns.len();
+        // Column by column, so that one load serves two products.
+        let mut rows = [[zero; TOGETHER]; COLUMNS];
+        for at in (0..BLOCK).step_by(S::LANES) {
+            for sum in &mut self.block.information {
+                zero.store(&mut sum[at..]);
+            }
+            let pose = load(simd, &self.block.pose, at);
+            let mut seen = zero;
+            let mut filled = 0;
+            for line in &self.target.lines {
+                for along in &line.x {
+                    let point = [*along, line.y, line.z];
+                    seen = seen + self.look::<S>(simd, &pose, point, &mut rows, filled);
+                    filled += 2;
+                    if filled == TOGETHER {
+                        add_squares(simd, &rows[..size], &mut self.block.information, at);
+                        filled = 0;
+                    }
+                }
+            }
+            if filled > 0 {
+                for column in &mut rows[..size] {
+                    column[filled..].fill(zero);
+                }
+                add_squares(simd, &rows[..size], &mut self.block.information, at);
+            }
+            seen.store(&mut self.block.seen[at..]);
+        }
+    }
+}
+
+impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
+    WidePoints<'_, DISTORTED, RATIONAL, PRISM>
+{
+    /// Writes the two rows of a point, zero where it is not in sight; one where it is.
+    #[inline(always)]
+    fn look<S: Simd>(
+        &self,
+        simd: S,
+        pose: &[S::Vector; 12],
+        point: [f64; 3],
+        rows: &mut [[S::Vector; TOGETHER]; COLUMNS],
+        at: usize,
+    ) -> S::Vector {
+        let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
+        let p = self.parameters;
+        let place = [simd.splat(point[0]), simd.splat(point[1]), simd.splat(point[2])];
+        let mut turned = [zero; 3];
+        for i in 0..3 {
+            let sum = pose[3 * i + 1].mul_add(place[1], pose[3 * i + 2] * place[2]);
+            turned[i] = pose[3 * i].mul_add(place[0], sum);
+        }
+        let depth = turned[2] + pose[11];
+        let w = one / depth;
+        let x = (turned[0] + pose[9]) * w;
+        let y = (turned[1] + pose[10]) * w;
+        let bent: Bent<S::Vector> =
+            if DISTORTED { bend::<S, RATIONAL, PRISM>(simd, p, x, y) } else { Bent::straight(simd, x, y) };
+        let in_sight = bent.in_sight(simd, self.window) & depth.greater(simd.splat(MIN_DEPTH_M));
+        let (w, x, y) = (w.keep(in_sight), x.keep(in_sight), y.keep(in_sight));
+        let aspect = simd.splat(p[1] / p[0]);
+        let jacobian = [
+            (bent.along_x.keep(in_sight), bent.cross_x.keep(in_sight)),
+            ((bent.cross_y * aspect).keep(in_sight), (bent.along_y * aspect).keep(in_sight)),
+        ];
+        for (row, (a, b)) in jacobian.into_iter().enumerate() {
+            let s = a.mul_add(x, b * y);
+            let (aw, bw, sw) = (a * w, b * w, -(s * w));
+            let to = at + row;
+            rows[0][to] = aw;
+            rows[1][to] = bw;
+            rows[2][to] = sw;
+            rows[3][to] = -y.mul_add(s, b);
+            rows[4][to] = x.mul_add(s, a);
+            rows[5][to] = b.mul_add(x, -(a * y));
+        }
+        let inverse_focal = simd.splat(1.0 / p[0]);
+        for (column, rows) in self.columns.iter().zip(&mut rows[6..]) {
+            let (u, v) = match column {
+                Column::BoardScale => {
+                    let mut pair = [zero; 2];
+                    for (row, (a, b)) in jacobian.into_iter().enumerate() {
+                        let across = a.mul_add(turned[0], b * turned[1]);
+                        pair[row] = w * a.mul_add(x, b * y).neg_mul_add(turned[2], across);
+                    }
+                    (pair[0], pair[1])
+                }
+                Column::Camera(0) => (bent.x * inverse_focal, zero),
+                Column::Camera(1) => (zero, bent.y * inverse_focal),
+                Column::Camera(2) => (inverse_focal, zero),
+                Column::Camera(3) => (zero, inverse_focal),
+                Column::Camera(i) => {
+                    let (u, v) = coefficient(simd, *i, x, y, &bent);
+                    (u, v * aspect)
+                }
+            };
+            rows[at] = u.keep(in_sight);
+            rows[at + 1] = v.keep(in_sight);
+        }
+        one.keep(in_sight)
+    }
+}
+
+/// Derivative of a point after the lens in a distortion coefficient, as `camera::brown_conrady::coefficients`.
+#[inline(always)]
+fn coefficient<S: Simd>(
+    simd: S,
+    parameter: usize,
+    x: S::Vector,
+    y: S::Vector,
+    bent: &Bent<S::Vector>,
+) -> (S::Vector, S::Vector) {
+    let zero = simd.splat(0.0);
+    let two = simd.splat(2.0);
+    let s = bent.squared_radius;
+    let radial = match parameter {
+        4 => bent.inverse_denominator * s,
+        5 => bent.inverse_denominator * s * s,
+        8 => bent.inverse_denominator * s * s * s,
+        9 => -(bent.radial * bent.inverse_denominator * s),
+        10 => -(bent.radial * bent.inverse_denominator * s * s),
+        11 => -(bent.radial * bent.inverse_denominator * s * s * s),
+        6 => return (two * x * y, (two * y).mul_add(y, s)),
+        7 => return ((two * x).mul_add(x, s), two * x * y),
+        12 => return (s, zero),
+        13 => return (s * s, zero),
+        14 => return (zero, s),
+        _ => return (zero, s * s),
+    };
+    (x * radial, y * radial)
+}
+
+/// Adds the squares of the rows to the information.
+#[inline(always)]
+fn add_squares<S: Simd>(
+    simd: S,
+    columns: &[[S::Vector; TOGETHER]],
+    information: &mut [[f64; BLOCK]],
+    at: usize,
+) {
+    let size = columns.len();
+    for (i, left) in columns.iter().enumerate() {
+        let sums = &mut information[packed(size, i, i)..=packed(size, i, size - 1)];
+        for (sum, right) in sums.iter_mut().zip(&columns[i..]) {
+            let mut even = simd.load(&sum[at..]);
+            let mut odd = left[1] * right[1];
+            for k in 0..TOGETHER / 2 {
+                even = left[2 * k].mul_add(right[2 * k], even);
+                if k > 0 {
+                    odd = left[2 * k + 1].mul_add(right[2 * k + 1], odd);
+                }
+            }
+            (even + odd).store(&mut sum[at..]);
+        }
+    }
+}
