@@ -4,6 +4,7 @@ from cyclopts import App, Parameter
 
 # Name, where it is, and the line that lists it; its own help is its docstring.
 COMMANDS = (
+    ("run", "handeye.cli.run:run", "Drive the arm from view to view until the answer is good enough."),
     ("solve", "handeye.cli.solve:solve", "Calibrate from a folder of views."),
     ("plan", "handeye.cli.plan:plan", "Rank the views to take next."),
     ("validate", "handeye.cli.validate:validate", "Test how far a calibration holds."),

@@ -38,7 +38,7 @@ class ViewLimits:
     """
 
     distance_m: tuple[float, float] = (0.25, 0.9)
-    tilt_rad: float = np.deg2rad(45.0)
+    tilt_rad: float = float(np.deg2rad(45.0))
     margin_px: float = 20.0
     fewest: int | None = None
 

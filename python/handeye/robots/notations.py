@@ -85,7 +85,8 @@ def pose_of_numbers(numbers: Sequence[float], notation: Notation) -> Pose:
 
 def pose_text(pose: Pose, notation: Notation) -> str:
     """Return a pose as a person at the teach pendant of this maker would read it: to 0.1 um and 1e-5 deg."""
-    numbers = pose_numbers(pose, notation)
+    # Adding zero turns a negative zero into a plain one.
+    numbers = [round(value, 9) + 0.0 for value in pose_numbers(pose, notation)]
     if notation is Notation.UR:
         return "p[" + ", ".join(f"{value:.7f}" for value in numbers) + "]"
     position = [f"{value:.4f}" for value in numbers[:3]]

@@ -164,8 +164,11 @@ def _look(cell: Cell, frame: Frame, digests: frozenset[str]) -> tuple[Detection,
     if frame.points is not None:
         if len(frame.points.point_ids) < MIN_POINTS:
             return Missed(Failure.NOT_FOUND, "the camera found no target", moved=True)
+        digest = _digest(frame.points.pixels.tobytes())
+        if digest in digests:
+            return Missed(Failure.STALE_IMAGE, "the same points as before, bit for bit", moved=True)
         try:
-            return Detection(frame.points.point_ids, frame.points.pixels), None
+            return Detection(frame.points.point_ids, frame.points.pixels), digest
         except HandeyeError as error:
             return Missed(Failure.BAD_IMAGE, error.message, moved=True)
     image = frame.image
@@ -175,7 +178,7 @@ def _look(cell: Cell, frame: Frame, digests: frozenset[str]) -> tuple[Detection,
         return Missed(
             Failure.BAD_IMAGE, f"an image of {shape} pixels, the camera has {width} x {height}", moved=True
         )
-    digest = hashlib.blake2b(image.tobytes(), digest_size=16).hexdigest()
+    digest = _digest(image.tobytes())
     if digest in digests:
         return Missed(Failure.STALE_IMAGE, "the same picture as before, bit for bit", moved=True)
     found = detect(image, cell.target)
@@ -185,6 +188,10 @@ def _look(cell: Cell, frame: Frame, digests: frozenset[str]) -> tuple[Detection,
     if len(found) < MIN_POINTS:
         return Missed(Failure.NOT_FOUND, f"only {len(found)} points of the target", moved=True, digest=digest)
     return found, digest
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.blake2b(content, digest_size=16).hexdigest()
 
 
 def encoded(image: Grey) -> bytes:

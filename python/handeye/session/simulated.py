@@ -26,10 +26,10 @@ PARAMETER_SIGMAS = (0.5, 0.5, 0.5, 0.5, 5e-4, 2e-3, 5e-5, 5e-5, 2e-3)
 def usual_errors() -> ArmErrors:
     """Return errors of an arm in good order: play, encoders, and links that are not quite as drawn."""
     return ArmErrors(
-        encoder_sigma_rad=np.deg2rad(0.005),
-        offset_sigma_rad=np.deg2rad(0.01),
+        encoder_sigma_rad=float(np.deg2rad(0.005)),
+        offset_sigma_rad=float(np.deg2rad(0.01)),
         length_sigma_m=0.1e-3,
-        backlash_rad=np.deg2rad(0.005),
+        backlash_rad=float(np.deg2rad(0.005)),
     )
 
 

@@ -2,8 +2,7 @@
 
 The turns are about the flange's own origin, as large as the room around the target in the first image allows,
 each about another axis, so that three views determine the answer. A turn that loses the target is tried
-smaller and
-the other way round.
+smaller and the other way round.
 """
 
 from collections.abc import Sequence
@@ -68,12 +67,30 @@ def starting_goal(
     return None
 
 
+def preview(start: Start, arm: Arm, workspace: Workspace, count: int) -> list[tuple[Pose, FloatArray]]:
+    """Return the first poses and joints as they will be if there is much room around the target."""
+    found = [(start.T_base_flange, np.array(start.joints_rad))]
+    body = Body(arm, workspace)
+    for number in range(1, count):
+        for trial in range(6):
+            pose = start.T_base_flange @ Pose.exp(_turn(number, trial, LARGEST_TILT_RAD))
+            joints, reached = arm.inverse_all(pose.matrix[np.newaxis], np.array(start.joints_rad), attempts=1)
+            if reached[0] and body.obstacle_on_path(start.joints_rad, joints[0]) is None:
+                found.append((pose, joints[0]))
+                break
+    return found
+
+
 def _twist(views: Sequence[View], trial: int, camera: Camera) -> FloatArray:
     room = _room_px(views[0], camera) / float(camera.parameters[:2].max())
-    tilt = np.clip(ROOM_SHARE * room, SMALLEST_TILT_RAD, LARGEST_TILT_RAD) * SHRINK ** (trial // 2)
-    roll = LARGEST_ROLL_RAD * SHRINK ** (trial // 2)
-    turn = _TURNS[len(views) - 1] * [tilt, tilt, roll] * (-1.0) ** trial
-    return np.concatenate([np.zeros(3), turn])
+    return _turn(len(views), trial, float(np.clip(ROOM_SHARE * room, SMALLEST_TILT_RAD, LARGEST_TILT_RAD)))
+
+
+def _turn(number: int, trial: int, tilt_rad: float) -> FloatArray:
+    """Return the twist (6,) of the flange for the view after so many others."""
+    shrunk = SHRINK ** (trial // 2)
+    turn = _TURNS[number - 1] * [tilt_rad * shrunk, tilt_rad * shrunk, LARGEST_ROLL_RAD * shrunk]
+    return np.concatenate([np.zeros(3), turn * (-1.0) ** trial])
 
 
 def _room_px(view: View, camera: Camera) -> float:

@@ -1,0 +1,402 @@
+"""`handeye run`: drive the arm from view to view until the accuracy asked for is reached."""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from handeye.cli.answer import Answer
+from handeye.cli.failures import UsageError
+from handeye.cli.options import Common
+from handeye.cli.output import check_new_folder
+from handeye.datasets import read_camera, read_target
+from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.planning.feasibility import ViewLimits
+from handeye.robots.manual import describe
+from handeye.robots.notations import Notation
+from handeye.robots.protocol import Goal
+from handeye.session.attempt import Patience
+from handeye.session.configuration import (
+    SIMULATED,
+    Configuration,
+    Prepared,
+    Simulation,
+    begin,
+    go_on,
+    prepare,
+)
+from handeye.session.drivers import Person
+from handeye.session.entry import Entry
+from handeye.session.faults import FaultRates
+from handeye.session.loop import START_VIEWS, End, EndReason
+from handeye.session.request import reach
+from handeye.session.simulated import usual_errors
+from handeye.session.starting import preview
+from handeye.solving import Estimate
+from handeye.types import Mounting
+from handeye.types.calibration import MM_PER_M, ModelName
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Corner = tuple[float, float, float]
+
+
+@Parameter(name="*", group="Limits of motion and views")
+@dataclass(frozen=True)
+class Limits:
+    """What no motion and no view may leave."""
+
+    workspace_mm: tuple[float, float, float, float, float, float] | None = None
+    """Box that the flange may move in, in the frame of the base: least x y z, largest x y z. Needed to move
+    a real arm."""
+    floor_mm: float = 0.0
+    """Height of table or floor in that frame."""
+    speed_deg_s: float = 30.0
+    """No joint moves faster."""
+    distance_mm: tuple[float, float] = (250.0, 900.0)
+    """Nearest and farthest distance from camera to target."""
+    tilt_deg: float = 45.0
+    """Largest angle at which the target is seen."""
+    margin_px: float = 20.0
+    """Distance from the border of the image."""
+
+
+@Parameter(name="*", group="Simulated cell")
+@dataclass(frozen=True)
+class Simulated:
+    """What is wrong in the simulated cell."""
+
+    arm_errors: float = 1.0
+    """Factor on the arm's usual errors; 0 is an exact arm."""
+    blur_px: float = 0.6
+    """Blur of the pictures."""
+    pixel_noise: float = 2.0
+    """Noise of the pictures, in grey values."""
+    points_only: float | None = None
+    """Project points with so much noise (px) instead of rendering and detecting: faster."""
+    faults: float = 0.0
+    """Share of attempts that each kind of fault of robot and camera befalls."""
+
+    def simulation(self) -> Simulation:
+        """Return it as the library takes it."""
+        usual = usual_errors()
+        scaled = type(usual)(**{name: value * self.arm_errors for name, value in vars(usual).items()})
+        rates = None
+        if self.faults > 0:
+            rates = FaultRates(**dict.fromkeys(vars(FaultRates()), self.faults))
+        return Simulation(
+            scaled,
+            rates,
+            blur_px=self.blur_px,
+            pixel_noise=self.pixel_noise,
+            points_only=self.points_only,
+            hang_s=3.0,
+        )
+
+
+def run(
+    *,
+    session: Path | None = None,
+    robot: str = "epson_c4l",
+    driver: str = SIMULATED,
+    images: str = SIMULATED,
+    target: Path | None = None,
+    camera: Path | None = None,
+    mounting: Mounting = Mounting.EYE_IN_HAND,
+    accuracy_mm: float = 0.5,
+    accuracy_deg: float = 0.05,
+    max_views: int = 20,
+    seed: int = 0,
+    model: ModelName = ModelName.AUTO,
+    resume: bool = False,
+    dry_run: bool = False,
+    confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
+    limits: Limits = Limits(),
+    simulated: Simulated = Simulated(),
+    common: Common = Common(),  # noqa: B008 - frozen
+) -> Answer:
+    """Drive the arm from view to view until the accuracy asked for is reached.
+
+    Three small turns about where the arm stands, then always to the view that teaches most. Without options
+    everything is simulated. Every attempt is written into the session before the arm moves again; Ctrl-C
+    stops the arm, and --resume goes on where it was. A session is a recording: solve, plan and validate take
+    it.
+
+    Parameters
+    ----------
+    session
+        Folder to write; a new one, or with --resume the one to go on with.
+    robot
+        Description of the arm: a shipped arm (epson_c4l, ur5e, lbr_iiwa_14) or a URDF file.
+    driver
+        What moves it: simulated, manual (a person; manual:kuka for another notation), replay:FOLDER, or a
+        driver of another package with its address.
+    images
+        Where pictures come from: simulated, folder:PATH, opencv:0, replay:FOLDER, or another package's.
+    target
+        Target in TOML or JSON; the simulated one is a chessboard.
+    camera
+        Calibrated camera in TOML, JSON or ROS's camera_info .yaml.
+    mounting
+        Where the camera sits.
+    accuracy_mm
+        Radius within which the camera's position shall lie with 95 % probability.
+    accuracy_deg
+        The same for its rotation.
+    max_views
+        Stop at so many views in any case.
+    seed
+        Of every choice by chance, and of the simulated cell.
+    model
+        auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
+    resume
+        Go on with a session; everything else is taken from it.
+    dry_run
+        Show what would be done first; nothing moves and nothing is written.
+    confirm
+        Ask before every motion; the default on a real arm.
+    """
+    person = _person()
+    if resume:
+        if session is None:
+            raise UsageError("--resume needs --session", hint="give the folder of the session to go on with")
+        return _resumed(session, person, confirm, as_json=common.json)
+    configuration = Configuration(
+        robot=_described(robot),
+        driver=driver,
+        images=images,
+        mounting=mounting,
+        accuracy_mm=accuracy_mm,
+        accuracy_deg=accuracy_deg,
+        most_views=max_views,
+        seed=seed,
+        model=model,
+        speed_rad_s=float(np.deg2rad(limits.speed_deg_s)),
+        workspace_m=_box(limits.workspace_mm),
+        floor_m=limits.floor_mm / MM_PER_M,
+        limits=ViewLimits(
+            (limits.distance_mm[0] / MM_PER_M, limits.distance_mm[1] / MM_PER_M),
+            float(np.deg2rad(limits.tilt_deg)),
+            limits.margin_px,
+        ),
+        patience=Patience(grab_s=2.0) if driver == SIMULATED and simulated.faults > 0 else _patience(driver),
+        simulation=simulated.simulation(),
+    )
+    if (driver == SIMULATED) != (images == SIMULATED):
+        raise UsageError("--driver and --images are either both simulated or both not")
+    prepared = prepare(
+        configuration,
+        camera=None if camera is None else read_camera(camera),
+        target=None if target is None else read_target(target),
+        person=person,
+        confirm=_confirm(confirm, configuration, person),
+    )
+    if dry_run:
+        return _plan(prepared)
+    if session is None:
+        raise UsageError("--session is missing", hint="name a folder to write, or look first with --dry-run")
+    check_new_folder(session)
+    loop, store = begin(prepared, session, None if common.json else _Progress())
+    try:
+        end = loop.run()
+        if prepared.truth is not None:
+            store.reveal(prepared.truth)
+    finally:
+        store.close()
+    return _answer(session, configuration, prepared, end)
+
+
+def _resumed(session: Path, person: Person, confirm: bool | None, *, as_json: bool) -> Answer:
+    from handeye.session.store import read_settings  # noqa: PLC0415
+
+    configuration = Configuration.from_dict(read_settings(session).get("configuration"))
+    loop, store, prepared = go_on(
+        session,
+        None if as_json else _Progress(),
+        person=person,
+        confirm=_confirm(confirm, configuration, person),
+    )
+    try:
+        end = loop.run()
+        if prepared.truth is not None:
+            store.reveal(prepared.truth)
+    finally:
+        store.close()
+    return _answer(session, configuration, prepared, end)
+
+
+def _described(robot: str) -> str:
+    """Return the name of an arm, or the whole path of its file: a session may be resumed from elsewhere."""
+    return str(Path(robot).resolve()) if Path(robot).suffix else robot
+
+
+def _box(
+    workspace_mm: tuple[float, float, float, float, float, float] | None,
+) -> tuple[Corner, Corner] | None:
+    if workspace_mm is None:
+        return None
+    x0, y0, z0, x1, y1, z1 = (value / MM_PER_M for value in workspace_mm)
+    return (x0, y0, z0), (x1, y1, z1)
+
+
+def _patience(driver: str) -> Patience:
+    # A person takes the time that a person takes.
+    return Patience(move_s=3600.0, read_s=600.0, grab_s=600.0) if driver.startswith("manual") else Patience()
+
+
+def _person() -> Person:
+    def tell(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    def ask(question: str) -> str:
+        print(question, end="", file=sys.stderr, flush=True)
+        line = sys.stdin.readline()
+        if not line:
+            raise EOFError
+        return line
+
+    return Person(ask, tell)
+
+
+def _confirm(wanted: bool | None, configuration: Configuration, person: Person) -> Any:  # noqa: ANN401
+    """Return what asks before a motion; by default on real arms, but not where a person moves it anyway."""
+    if wanted is None:
+        wanted = not configuration.is_simulated and not configuration.driver.startswith(("manual", "replay"))
+    if not wanted:
+        return None
+
+    def confirm(goal: Goal) -> bool:
+        person.tell(describe(goal, [Notation.UR]))
+        try:
+            return person.ask("move there? [y/N] ").strip().lower() in {"y", "yes"}
+        except EOFError:
+            return False
+
+    return confirm
+
+
+class _Progress:
+    """Says on stderr what each attempt brought."""
+
+    def __call__(self, entry: Entry, estimate: Estimate | None) -> None:
+        known = ""
+        if estimate is not None:
+            now = reach(estimate)
+            known = f"  (before: within {now.translation_mm:.2f} mm, {now.rotation_deg:.3f} deg)"
+        what = "ok" if entry.view is not None else f"{entry.failure}: {entry.detail[:100]}"
+        seconds = sum(entry.timings_s.values())
+        print(
+            f"{entry.label:<11} {entry.phase:<6}{seconds:5.1f} s  {what}{known}", file=sys.stderr, flush=True
+        )
+
+
+def _plan(prepared: Prepared) -> Answer:
+    goals = [
+        Goal(f"view_{i:02d}.1", pose, tuple(joints.tolist()), prepared.configuration.speed_rad_s)
+        for i, (pose, joints) in enumerate(
+            preview(prepared.start, prepared.arm, prepared.cell.workspace, START_VIEWS), start=1
+        )
+    ]
+    space, wish = prepared.cell.workspace, prepared.configuration
+    data: dict[str, Any] = {
+        "dry_run": True,
+        "arm": prepared.arm.name,
+        "workspace_mm": [(MM_PER_M * space.lower_m).tolist(), (MM_PER_M * space.upper_m).tolist()],
+        "speed_deg_s": float(np.rad2deg(wish.speed_rad_s)),
+        "accuracy_mm": wish.accuracy_mm,
+        "accuracy_deg": wish.accuracy_deg,
+        "most_views": wish.most_views,
+        "first_goals": [
+            {
+                "label": goal.label,
+                "T_base_flange": goal.T_base_flange.to_list(),
+                "joints_deg": np.rad2deg(goal.joints_rad or ()).tolist(),
+            }
+            for goal in goals
+        ],
+    }
+
+    def show(console: "Console") -> None:
+        low, high = (" ".join(f"{v:.0f}" for v in corner) for corner in data["workspace_mm"])
+        console.print(
+            f"{prepared.arm.name}: no motion leaves the box from ({low}) to ({high}) mm or is faster than "
+            f"{data['speed_deg_s']:.0f} deg/s. {START_VIEWS} views around where the arm stands, turned at "
+            "most as here, less where there is less room in the first picture; then the views that teach "
+            f"most, until the camera is known to {wish.accuracy_mm} mm and {wish.accuracy_deg} deg with 95 % "
+            f"probability, at most {wish.most_views} views.\n"
+        )
+        for goal in goals:
+            console.print(describe(goal, list(Notation)), markup=False)
+
+    return Answer(data, show)
+
+
+def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end: End) -> Answer:
+    hint = f"handeye run --resume --session {folder} goes on"
+    if end.reason is EndReason.TOO_MANY_FAILURES:
+        raise DeviceError(end.sentence, code=end.reason, hint=hint)
+    if end.reason is EndReason.NO_START:
+        raise DetectionError(end.sentence, code=end.reason, hint=hint)
+    calibration = end.calibration
+    if calibration is None:
+        raise HandeyeError(
+            f"{end.sentence}; the views do not determine the answer", code=end.reason, hint=hint
+        )
+    error: Mapping[str, float] | None = None
+    if prepared.truth is not None and prepared.truth.X is not None:
+        off = (calibration.X @ prepared.truth.X.inverse()).log()
+        error = {
+            "translation_mm": MM_PER_M * float(np.linalg.norm(off[:3])),
+            "rotation_deg": float(np.rad2deg(np.linalg.norm(off[3:]))),
+        }
+    data: dict[str, Any] = {
+        "session": str(folder),
+        "end": end.reason.value,
+        "sentence": end.sentence,
+        "request_met": end.reason is EndReason.ACCURACY_REACHED,
+        "views": end.views,
+        "attempts": end.attempts,
+        "within_95": None if end.reach is None else vars(end.reach),
+        "true_error": error,
+        "seed": configuration.seed,
+        "calibration": calibration.to_dict(),
+    }
+    return Answer(data, lambda console: _show(console, data, end, error))
+
+
+def _show(console: "Console", data: Mapping[str, Any], end: End, error: Mapping[str, float] | None) -> None:
+    from handeye.cli.wording import heading, notices, pairs, pose_lines  # noqa: PLC0415
+
+    calibration = end.calibration
+    if calibration is None:
+        return
+    met = "accuracy reached" if data["request_met"] else "accuracy NOT reached"
+    heading(console, met, end.sentence)
+    name = calibration.mounting.result_names[0]
+    console.print()
+    heading(console, name)
+    pairs(console, pose_lines(calibration.results[name]), indent=2)
+    console.print()
+    rows = [("views", f"{end.views} of {end.attempts} attempts")]
+    if end.reach is not None:
+        rows.append(
+            (
+                "predicted",
+                f"within {end.reach.translation_mm:.3f} mm and {end.reach.rotation_deg:.4f} deg (95 %)",
+            )
+        )
+    if error is not None:
+        rows.append(
+            (
+                "truth",
+                f"off by {error['translation_mm']:.3f} mm and {error['rotation_deg']:.4f} deg (simulated)",
+            )
+        )
+    rows.append(("written", data["session"]))
+    pairs(console, rows)
+    notices(console, "Warnings", calibration.warnings)

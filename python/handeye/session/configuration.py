@@ -1,0 +1,298 @@
+"""Everything that was asked for, as it is written into a session, and the cell that follows from it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from handeye.cameras.render import Appearance
+from handeye.cameras.simulated import Optics
+from handeye.errors import InputError
+from handeye.planning.collisions import Workspace
+from handeye.planning.feasibility import ViewLimits
+from handeye.planning.policies import make_policy
+from handeye.robots import Arm, open_arm
+from handeye.robots.protocol import Goal
+from handeye.robots.simulated import ArmErrors, SimulatedArm
+from handeye.session.attempt import Cell, Patience
+from handeye.session.drivers import Person, open_camera, open_robot
+from handeye.session.faults import FaultRates
+from handeye.session.loop import Progress, Session, Wish
+from handeye.session.simulated import SimulationOptions, simulated_cell, usual_errors
+from handeye.session.starting import Start
+from handeye.session.store import SessionStore, create_session, open_session
+from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth
+from handeye.types.calibration import ModelName
+from handeye.types.plain import read_document
+
+SIMULATED = "simulated"
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What is wrong in a simulated cell, in the units of `ArmErrors` and `Appearance`."""
+
+    errors: ArmErrors = field(default_factory=usual_errors)
+    faults: FaultRates | None = None
+    blur_px: float = 0.6
+    pixel_noise: float = 2.0
+    occluded_share: float = 0.0
+    points_only: float | None = None
+    camera_error: float = 1.0
+    hang_s: float = 60.0
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A run, in plain values.
+
+    Parameters
+    ----------
+    robot
+        Name of a shipped arm, or a URDF file.
+    driver, images
+        Specifications of the drivers, see `handeye.session.drivers`.
+    workspace_m
+        Corners of the box that no motion may leave; None only for a simulated cell.
+    start_rad
+        Joints to start from, for an arm that is simulated; others start where they stand.
+    """
+
+    robot: str
+    driver: str = SIMULATED
+    images: str = SIMULATED
+    mounting: Mounting = Mounting.EYE_IN_HAND
+    accuracy_mm: float | None = 0.5
+    accuracy_deg: float | None = 0.05
+    most_views: int = 20
+    seed: int = 0
+    model: ModelName = ModelName.AUTO
+    policy: str = "next_best_view"
+    speed_rad_s: float = 0.5
+    failures_in_a_row: int = 10
+    workspace_m: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+    floor_m: float = 0.0
+    limits: ViewLimits = field(default_factory=ViewLimits)
+    patience: Patience = field(default_factory=Patience)
+    simulation: Simulation = field(default_factory=Simulation)
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether nothing moves."""
+        return self.driver == SIMULATED
+
+    def wish(self) -> Wish:
+        """Return what is asked for."""
+        return Wish(
+            self.accuracy_mm,
+            self.accuracy_deg,
+            self.most_views,
+            self.seed,
+            ModelName(self.model),
+            self.failures_in_a_row,
+            speed_rad_s=self.speed_rad_s,
+            policy=make_policy(self.policy),
+        )
+
+    def workspace(self) -> Workspace:
+        """Return the stated workspace.
+
+        Raises
+        ------
+        InputError
+            None is stated.
+        """
+        if self.workspace_m is None:
+            raise InputError(
+                "no workspace is stated, and without one nothing moves",
+                code="no_workspace",
+                hint="state the box that the flange may move in, in the frame of the robot's base",
+            )
+        lower, upper = self.workspace_m
+        return Workspace(np.array(lower), np.array(upper), self.floor_m)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON; `from_dict` reads them back."""
+        return msgspec.to_builtins(self)
+
+    @classmethod
+    def from_dict(cls, data: object) -> "Configuration":
+        """Read what `to_dict` wrote.
+
+        Raises
+        ------
+        InputError
+            A missing or unusable field.
+        """
+        return read_document(data, cls, "settings")
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A run, ready to begin: the cell, where the arm stands, and the truth if it is simulated."""
+
+    configuration: Configuration
+    arm: Arm
+    cell: Cell
+    start: Start
+    recording: Recording
+    truth: Truth | None
+    hidden_arm: SimulatedArm | None
+
+
+def prepare(
+    configuration: Configuration,
+    *,
+    camera: Camera | None = None,
+    target: Target | None = None,
+    person: Person | None = None,
+    confirm: Callable[[Goal], bool] | None = None,
+    start: Start | None = None,
+) -> Prepared:
+    """Open the drivers and see where the arm stands; nothing moves.
+
+    Parameters
+    ----------
+    camera, target
+        Needed unless the cell is simulated.
+    person
+        Asked by the drivers that need a person.
+    start
+        Where the arm stood when the session began, on going on; None to ask the robot.
+
+    Raises
+    ------
+    InputError
+        Something is missing or unknown.
+    DeviceError
+        A driver fails.
+    """
+    arm = open_arm(configuration.robot)
+    if configuration.is_simulated:
+        return _simulated(configuration, arm, target, confirm)
+    if camera is None or target is None:
+        raise InputError("a real cell needs camera and target", code="missing_value")
+    workspace = configuration.workspace()
+    person = person or Person(_nobody, lambda _: None)
+    robot = open_robot(configuration.driver, person)
+    source = open_camera(configuration.images, robot, person)
+    cell = Cell(robot, source, arm, workspace, camera, target, configuration.patience, confirm)
+    if start is None:
+        reading = cell.read()
+        joints = reading.joints_rad or tuple(arm.inverse(reading.T_base_flange).tolist())
+        start = Start(reading.T_base_flange, joints)
+    recording = Recording(f"session with {arm.name}", configuration.mounting, camera, target, ())
+    return Prepared(configuration, arm, cell, start, recording, None, None)
+
+
+def begin(prepared: Prepared, folder: Any, progress: Progress | None = None) -> tuple[Session, SessionStore]:  # noqa: ANN401
+    """Make the folder of a session and the session.
+
+    Raises
+    ------
+    OutputError
+        The folder is not empty or cannot be written.
+    """
+    settings = {
+        "configuration": prepared.configuration.to_dict(),
+        "start": {
+            "T_base_flange": prepared.start.T_base_flange.to_list(),
+            "joints_rad": list(prepared.start.joints_rad),
+        },
+    }
+    store = create_session(folder, prepared.recording, settings)
+    return _session(prepared, store, progress), store
+
+
+def go_on(
+    folder: Any,  # noqa: ANN401 - a path
+    progress: Progress | None = None,
+    *,
+    person: Person | None = None,
+    confirm: Callable[[Goal], bool] | None = None,
+) -> tuple[Session, SessionStore, Prepared]:
+    """Open a session that was broken off, or has ended, with the same settings.
+
+    Raises
+    ------
+    InputError
+        No session, or one that was damaged.
+    DeviceError
+        A driver fails.
+    """
+    store = open_session(folder)
+    try:
+        configuration = Configuration.from_dict(store.settings.get("configuration"))
+        start = read_start(store.settings)
+        recording = store.recording
+        prepared = prepare(
+            configuration,
+            camera=recording.camera,
+            target=recording.target,
+            person=person,
+            confirm=confirm,
+            start=start,
+        )
+        if prepared.hidden_arm is not None:
+            standing = next((e.goal_joints for e in reversed(store.entries) if e.moved), start.joints_rad)
+            prepared.hidden_arm.place(standing)
+    except BaseException:
+        store.close()
+        raise
+    return _session(prepared, store, progress), store, prepared
+
+
+def read_start(settings: Mapping[str, Any]) -> Start:
+    """Return where the arm stood when a session began.
+
+    Raises
+    ------
+    InputError
+        The settings do not say.
+    """
+    document = read_document(settings.get("start"), _StartDocument, "settings: start")
+    return Start(Pose(document.T_base_flange), tuple(document.joints_rad))
+
+
+@dataclass(frozen=True)
+class _StartDocument:
+    T_base_flange: list[list[float]]
+    joints_rad: list[float]
+
+
+def _session(prepared: Prepared, store: SessionStore, progress: Progress | None) -> Session:
+    configuration = prepared.configuration
+    return Session(prepared.cell, store, prepared.start, configuration.wish(), configuration.limits, progress)
+
+
+def _simulated(
+    configuration: Configuration, arm: Arm, target: Target | None, confirm: Callable[[Goal], bool] | None
+) -> Prepared:
+    wrong = configuration.simulation
+    look = Appearance(blur_px=wrong.blur_px, noise=wrong.pixel_noise)
+    optics = Optics(look, occluded_share=wrong.occluded_share, points_only=wrong.points_only)
+    usual = SimulationOptions()
+    options = SimulationOptions(
+        seed=configuration.seed,
+        mounting=Mounting(configuration.mounting),
+        target=target or usual.target,
+        errors=wrong.errors,
+        optics=optics,
+        faults=wrong.faults,
+        camera_error=wrong.camera_error,
+        hang_s=wrong.hang_s,
+        patience=configuration.patience,
+    )
+    made = simulated_cell(arm, options)
+    cell = made.cell
+    workspace = cell.workspace if configuration.workspace_m is None else configuration.workspace()
+    cell = Cell(
+        cell.robot, cell.source, arm, workspace, cell.camera, cell.target, configuration.patience, confirm
+    )
+    return Prepared(configuration, arm, cell, made.start, made.recording, made.truth, made.hidden_arm)
+
+
+def _nobody(question: str) -> str:
+    raise EOFError(question)

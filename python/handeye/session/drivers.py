@@ -1,0 +1,112 @@
+"""Drivers by name: those of this package, and those that other packages announce as entry points.
+
+A package that drives a robot declares ``[project.entry-points."handeye.robots"]`` with ``name =
+"module:factory"``; the factory takes the address as text and returns a `Robot`. Cameras are in the group
+``handeye.cameras``.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from handeye.cameras.capture import Capture
+from handeye.cameras.folder import WatchedFolder
+from handeye.cameras.protocol import ImageSource
+from handeye.cameras.replay import ReplayCamera
+from handeye.datasets import LoadedRecording, read_recording
+from handeye.datasets.images import read_image
+from handeye.errors import DeviceError, InputError
+from handeye.robots.manual import ManualRobot
+from handeye.robots.notations import Notation
+from handeye.robots.protocol import Robot
+from handeye.robots.replay import ReplayRobot
+from handeye.types import View
+
+ROBOT_GROUP, CAMERA_GROUP = "handeye.robots", "handeye.cameras"
+ROBOTS = ("simulated", "manual", "replay")
+CAMERAS = ("simulated", "folder", "opencv", "replay")
+
+
+@dataclass(frozen=True)
+class Person:
+    """How to talk to whoever sits in front of it."""
+
+    ask: Callable[[str], str]
+    tell: Callable[[str], None]
+
+
+def open_robot(spec: str, person: Person) -> Robot:
+    """Return the robot of a specification: `manual`, `manual:kuka`, `replay:FOLDER` or `NAME:ADDRESS`.
+
+    Raises
+    ------
+    InputError
+        No such driver.
+    DeviceError
+        The driver cannot reach its robot.
+    """
+    name, _, address = spec.partition(":")
+    if name == "manual":
+        try:
+            notation = Notation(address or Notation.UR)
+        except ValueError:
+            raise InputError(
+                f"notation {address!r}, expected one of {', '.join(Notation)}", code="unknown_notation"
+            ) from None
+        return ManualRobot(person.ask, person.tell, notation)
+    if name == "replay":
+        return ReplayRobot(read_recording(address).recording.views)
+    return _announced(ROBOT_GROUP, name, address, ROBOTS, Robot)
+
+
+def open_camera(spec: str, robot: Robot, person: Person) -> ImageSource:
+    """Return the camera of a specification: `folder:PATH`, `opencv:0`, `replay:FOLDER` or `NAME:ADDRESS`.
+
+    Raises
+    ------
+    InputError
+        No such driver, or a replay without a replayed robot.
+    DeviceError
+        The driver cannot reach its camera.
+    """
+    name, _, address = spec.partition(":")
+    if name == "folder":
+        return WatchedFolder(Path(address), read_image, announce=person.tell)
+    if name == "opencv":
+        return Capture(int(address) if address.isdecimal() else address)
+    if name == "replay":
+        if not isinstance(robot, ReplayRobot):
+            raise InputError("a replayed camera needs a replayed robot", code="unknown_driver")
+        loaded = read_recording(address)
+        has_images = any(view.image is not None for view in loaded.recording.views)
+        return ReplayCamera(lambda: robot.view, _reader(loaded) if has_images else None)
+    return _announced(CAMERA_GROUP, name, address, CAMERAS, ImageSource)
+
+
+def _reader(loaded: LoadedRecording) -> Callable[[View], Any]:
+    def read(view: View) -> Any:  # noqa: ANN401 - an image
+        path = loaded.image_path(view)
+        if path is None:
+            raise DeviceError(f"view {view.name}: no image was kept", code="no_image")
+        return read_image(path)
+
+    return read
+
+
+def _announced(group: str, name: str, address: str, own: tuple[str, ...], kind: type[Any]) -> Any:  # noqa: ANN401
+    found = {point.name: point for point in entry_points(group=group)}
+    if name not in found:
+        raise InputError(
+            f"no driver {name[:60]!r}, expected one of {', '.join([*own, *sorted(found)])}",
+            code="unknown_driver",
+            hint=f"a package with a driver announces it in the entry point group {group}",
+        )
+    try:
+        driver = found[name].load()(address)
+    except Exception as error:
+        raise DeviceError(f"driver {name}: {type(error).__name__}: {error}", code="driver_failed") from error
+    if not isinstance(driver, kind):
+        raise InputError(f"driver {name}: {type(driver).__name__} lacks a method of {kind.__name__}")
+    return driver
