@@ -1,1 +1,1 @@
-"""How good a calibration is: metrics, and studies that compare policies, models and claims with truth."""
+"""How good a calibration is, and studies that compare policies, models and claims with the truth."""

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from handeye.evaluation.comparison import POLICIES, SetResult
+from handeye.evaluation.studies.coverage import Coverage
 from handeye.evaluation.studies.curves import Curves, correlations, scatters
 
 # Colours that colour-blind readers tell apart (Okabe and Ito), and marks for print without colour.
@@ -136,3 +137,82 @@ def _without_far_values(axis: Axes, values: Sequence[float] | np.ndarray) -> Non
             fontsize="small",
             alpha=0.7,
         )
+
+
+def errors_figure(sets: Sequence[SetResult], panels: Sequence[tuple[str, str]], title: str) -> Figure:
+    """Draw what each policy reached after its last view, a box of quartiles per set and policy.
+
+    Parameters
+    ----------
+    panels
+        Metric and label of each panel.
+    """
+    figure = Figure(
+        figsize=(max(6.0, 2.4 * len(sets) + 2), 3.0 * len(panels) + 0.6), layout="constrained", dpi=150
+    )
+    for i, (metric, label) in enumerate(panels):
+        axis = figure.add_subplot(len(panels), 1, i + 1)
+        for j, policy in enumerate(POLICIES):
+            _boxes(axis, sets, policy, metric, (j - 1) * 0.26)
+        axis.set_xticks(range(len(sets)), [result.name for result in sets])
+        axis.set_ylabel(label)
+        axis.set_ylim(bottom=0)
+        axis.grid(visible=True, axis="y", alpha=0.25, linewidth=0.6)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(POLICIES), frameon=False)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _boxes(axis: Axes, sets: Sequence[SetResult], policy: str, metric: str, shift: float) -> None:
+    name, colour, _ = _STYLES[policy]
+    values = [result.final(policy, metric) for result in sets]
+    places = [i + shift for i in range(len(sets))]
+    boxes = axis.boxplot(
+        values,
+        positions=places,
+        widths=0.2,
+        patch_artist=True,
+        showmeans=True,
+        manage_ticks=False,
+        medianprops={"color": "black", "linewidth": 1.2},
+        meanprops={"marker": "D", "markersize": 3.5, "markerfacecolor": "white", "markeredgecolor": "black"},
+        flierprops={
+            "marker": ".",
+            "markersize": 3,
+            "alpha": 0.5,
+            "markeredgewidth": 0,
+            "markerfacecolor": colour,
+        },
+    )
+    for box in boxes["boxes"]:
+        box.set(facecolor=colour, alpha=0.55, linewidth=0.8)
+    boxes["boxes"][0].set_label(name)
+
+
+def coverage_figure(coverage: Coverage) -> Figure:
+    """Draw coverage and NEES of each kind of error, with two standard errors and where they should lie."""
+    kinds = list(coverage.kinds)
+    table = coverage.to_dict()["kinds"]
+    figure = Figure(figsize=(9, 0.42 * len(kinds) + 1.5), layout="constrained", dpi=150)
+    panels = (
+        ("coverage_95", "share of 95 % regions that hold the truth", 0.95, (0.93, 0.97)),
+        ("nees_per_dof", "NEES / 6", 1.0, (0.9, 1.1)),
+    )
+    places = np.arange(len(kinds))[::-1]
+    for i, (key, label, ideal, window) in enumerate(panels):
+        axis = figure.add_subplot(1, 2, i + 1)
+        axis.axvspan(*window, color="0.9", linewidth=0)
+        axis.axvline(ideal, color="0.4", linewidth=0.8)
+        values = [table[kind.value][key] for kind in kinds]
+        errors = [2 * table[kind.value][f"{key}_standard_error"] for kind in kinds]
+        axis.errorbar(values, places, xerr=errors, fmt="o", markersize=4.5, color="#0072B2", capsize=2)
+        axis.set_yticks(places, [kind.value.replace("_", " ") for kind in kinds] if i == 0 else [])
+        axis.set_ylim(-0.6, len(kinds) - 0.4)
+        axis.set_xlabel(label)
+        axis.grid(visible=True, axis="x", alpha=0.25, linewidth=0.6)
+    trials = max(len(runs) for runs in coverage.kinds.values())
+    figure.suptitle(
+        f"model {coverage.model}, {trials} simulated calibrations per kind of error", fontsize="medium"
+    )
+    return figure

@@ -1,0 +1,381 @@
+"""`handeye study`: the tables and figures of the paper, and those that go beyond it, on public data."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Parameter
+
+from handeye.cli.answer import Answer
+from handeye.cli.options import Common
+from handeye.cli.output import write_figure, write_json
+from handeye.cli.progress import progress
+from handeye.errors import InputError, OutputError
+from handeye.types.calibration import ModelName
+from handeye.types.mounting import Mounting
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.console import Console
+
+    from handeye.types import Recording
+
+study = App(
+    name="study",
+    help="Compare policies and models on public data, and claims with the truth.\n\n"
+    "The data are the sets of Ali, Suominen, Gotchev and Ruiz Morales (Sensors 19(12), 2837, 2019). What is "
+    "found in their images is remembered in the user's cache folder (HANDEYE_CACHE names another).",
+    result_action="return_value",
+)
+
+
+@Parameter(name="*", group="Study")
+@dataclass(frozen=True)
+class Trials:
+    """What every study asks for."""
+
+    model: ModelName = ModelName.AUTO
+    """auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact."""
+    trials: Annotated[int | None, Parameter(show_default=False)] = None
+    """Random starts of each set, or simulated calibrations of each kind; 50, or 500."""
+    seed: int = 0
+    """Seed of everything random."""
+    workers: Annotated[int | None, Parameter(show_default=False)] = None
+    """Processes; all processors by default. The results do not depend on it."""
+    output: Path | None = None
+    """Folder for the pictures and the JSON object; made if it does not exist."""
+
+    def count(self, usual: int) -> int:
+        """Return the number of trials, `usual` unless given.
+
+        Raises
+        ------
+        InputError
+            Fewer than one.
+        """
+        trials = usual if self.trials is None else self.trials
+        if trials < 1:
+            raise InputError(f"{trials} trials, expected at least 1", code="out_of_range")
+        return trials
+
+    @property
+    def processes(self) -> int:
+        """Number of processes."""
+        if self.workers is not None:
+            return self.workers
+        from joblib import cpu_count  # noqa: PLC0415  # pyright: ignore[reportUnknownVariableType]
+
+        count: int = cpu_count()
+        return count
+
+
+@Parameter(name="*", group="Data")
+@dataclass(frozen=True)
+class Data:
+    """Where the sets are."""
+
+    data: Path | None = None
+    """Folder that holds the sets, or holds rwhe-calib; by default what HANDEYE_DATA names."""
+    sets: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = ()
+    """Names of the sets, if not the usual ones of the study: any folders that `handeye solve` reads."""
+    no_cache: bool = False
+    """Look for the target anew, and remember nothing."""
+
+    def load(self, usual: Sequence[str], workers: int) -> "list[Recording]":
+        """Return the recordings, `usual` ones unless named.
+
+        Raises
+        ------
+        InputError, DetectionError, DegenerateError, SolveError
+            As `handeye.evaluation.data.load_sets`.
+        """
+        from handeye.evaluation.data import cache_folder, data_folder, load_sets  # noqa: PLC0415
+
+        names = self.sets or tuple(usual)
+        folder = data_folder(self.data)
+        with progress("Reading the sets") as advance:
+            return load_sets(
+                folder,
+                names,
+                workers=workers,
+                cache=None if self.no_cache else cache_folder(),
+                progress=advance,
+            )
+
+
+@study.command
+def table1(
+    *,
+    data: Data = Data(),
+    trials: Trials = Trials(),
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Reproduce the paper's table I: errors against truth on simulated sets, three policies.
+
+    3 random views that determine the answer, the same for every policy, then 5 more by each. The camera is
+    calibrated from the set; --model paper takes it and the robot as exact, as the paper does.
+    """
+    from handeye.evaluation.data import SIMULATED_SETS  # noqa: PLC0415 - help need not wait for it
+    from handeye.evaluation.studies import study_table1  # noqa: PLC0415
+
+    _check_folder(trials.output)
+    count = trials.count(50)
+    recordings = data.load(SIMULATED_SETS, trials.processes)
+    with progress("Calibrating from random starts") as advance:
+        result = study_table1(
+            recordings,
+            model=trials.model,
+            trials=count,
+            seed=trials.seed,
+            workers=trials.processes,
+            progress=advance,
+        )
+
+    def pictures() -> "Iterable[tuple[str, Figure]]":
+        from handeye.evaluation.plots import errors_figure  # noqa: PLC0415
+
+        panels = (("translation_mm", "translation error (mm)"), ("rotation_deg", "rotation error (deg)"))
+        title = f"errors against truth after 3 + 5 views, model {result.model}, {count} random starts"
+        yield "table1", errors_figure(result.sets, panels, title)
+
+    document = result.to_dict()
+    written = _write(trials.output, "table1", document, pictures)
+
+    def show(console: "Console") -> None:
+        from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
+
+        tables.show_title(console, "Error against truth after 3 + 5 views", document)
+        parts = {"all sets": document, **document["sets"]}
+        tables.show_policies(console, parts, (("translation_mm", "mm"), ("rotation_deg", "deg")))
+        tables.show_written(console, written)
+
+    return Answer(document, show)
+
+
+@study.command
+def curves(
+    *,
+    data: Data = Data(),
+    trials: Trials = Trials(),
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Draw the paper's curves against the number of added views, and what gains are worth.
+
+    A third of the views is held out to measure on. Every candidate of the first step is tried, for the
+    scatter of predicted gain against the reduction of the held-out error.
+    """
+    from handeye.evaluation.data import REAL_SETS, SIMULATED_SETS  # noqa: PLC0415
+    from handeye.evaluation.studies import study_curves  # noqa: PLC0415
+
+    _check_folder(trials.output)
+    count = trials.count(50)
+    recordings = data.load([*SIMULATED_SETS, *REAL_SETS], trials.processes)
+    with progress("Calibrating from random starts") as advance:
+        result = study_curves(
+            recordings,
+            model=trials.model,
+            trials=count,
+            seed=trials.seed,
+            workers=trials.processes,
+            progress=advance,
+        )
+
+    def pictures() -> "Iterable[tuple[str, Figure]]":
+        from handeye.evaluation.plots import curves_figure, scatter_figure  # noqa: PLC0415
+
+        for part in result.sets:
+            yield f"curves_{part.name}", curves_figure(result, part)
+        yield "scatter", scatter_figure(result)
+
+    document = result.to_dict()
+    written = _write(trials.output, "curves", document, pictures)
+
+    def show(console: "Console") -> None:
+        from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
+
+        tables.show_title(console, "Means after 0, 1, ... views added to 3, a third held out", document)
+        for name, part in document["sets"].items():
+            tables.show_curves(console, name, part)
+        median = document["correlation"]["median"]
+        console.print(
+            f"correlation of predicted gain and reduction of the held-out RMSE: median {median:.2f}"
+        )
+        tables.show_written(console, written)
+
+    return Answer(document, show)
+
+
+@study.command
+def holdout(
+    *,
+    data: Data = Data(),
+    trials: Trials = Trials(),
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Measure on real sets: errors on a third of the views held out, and how well halves agree.
+
+    Held-out errors reward an answer that follows the robot's error; the agreement of disjoint halves does
+    not.
+    """
+    from handeye.evaluation.data import REAL_SETS  # noqa: PLC0415
+    from handeye.evaluation.studies import study_holdout  # noqa: PLC0415
+
+    _check_folder(trials.output)
+    count = trials.count(50)
+    recordings = data.load(REAL_SETS, trials.processes)
+    with progress("Calibrating from random starts") as advance:
+        result = study_holdout(
+            recordings,
+            model=trials.model,
+            trials=count,
+            seed=trials.seed,
+            workers=trials.processes,
+            progress=advance,
+        )
+
+    def pictures() -> "Iterable[tuple[str, Figure]]":
+        from handeye.evaluation.plots import errors_figure  # noqa: PLC0415
+
+        panels = (
+            ("relative_translation_mm", "relative translation error (mm)"),
+            ("relative_rotation_deg", "relative rotation error (deg)"),
+        )
+        title = f"held-out errors after 3 + 5 views, model {result.model}, {count} random starts"
+        yield "holdout", errors_figure(result.sets, panels, title)
+
+    document = result.to_dict()
+    written = _write(trials.output, "holdout", document, pictures)
+
+    def show(console: "Console") -> None:
+        from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
+
+        tables.show_title(console, "Error on held-out views after 3 + 5 views", document)
+        metrics = (("relative_translation_mm", "mm"), ("relative_rotation_deg", "deg"), ("rmse_px", "px"))
+        tables.show_policies(console, document["sets"], metrics)
+        tables.show_halves(console, document["sets"])
+        tables.show_written(console, written)
+
+    return Answer(document, show)
+
+
+@study.command
+def injected(
+    *,
+    data: Data = Data(),
+    trials: Trials = Trials(),
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Add noise to the robot poses of a simulated set, its levels not told, and compare with the truth.
+
+    On the base side 0.225 mm and 0.0169 deg per axis, on the flange side 0.15 mm and 0.01125 deg, drawn anew
+    for each random start.
+    """
+    from handeye.evaluation.data import SIMULATED_SETS  # noqa: PLC0415
+    from handeye.evaluation.studies import study_injected  # noqa: PLC0415
+
+    _check_folder(trials.output)
+    count = trials.count(50)
+    recordings = data.load(SIMULATED_SETS[-1:], trials.processes)
+    with progress("Calibrating from random starts") as advance:
+        result = study_injected(
+            recordings,
+            model=trials.model,
+            trials=count,
+            seed=trials.seed,
+            workers=trials.processes,
+            progress=advance,
+        )
+    document = result.to_dict()
+    written = _write(trials.output, "injected", document, lambda: ())
+
+    def show(console: "Console") -> None:
+        from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
+
+        tables.show_title(console, "Error against truth after 3 + 5 views, noise injected", document)
+        parts = {
+            f"{side}, {name}": part
+            for side, found in document["sides"].items()
+            for name, part in found["sets"].items()
+        }
+        tables.show_policies(console, parts, (("translation_mm", "mm"), ("rotation_deg", "deg")))
+        tables.show_written(console, written)
+
+    return Answer(document, show)
+
+
+@study.command
+def coverage(
+    *,
+    mounting: Mounting = Mounting.EYE_IN_HAND,
+    trials: Trials = Trials(),
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Count how often the 95 % region of the hand-eye holds the truth, for each kind of error.
+
+    Calibrations of a simulated arm from 8 to 12 views. A true covariance gives 0.95, and a NEES of one per
+    degree of freedom.
+
+    Parameters
+    ----------
+    mounting
+        Where the camera sits.
+    """
+    from handeye.evaluation.simulate import CellOptions  # noqa: PLC0415
+    from handeye.evaluation.studies import study_coverage  # noqa: PLC0415
+
+    _check_folder(trials.output)
+    with progress("Calibrating simulated cells") as advance:
+        result = study_coverage(
+            model=trials.model,
+            cell=CellOptions(mounting=mounting),
+            trials=trials.count(500),
+            seed=trials.seed,
+            workers=trials.processes,
+            progress=advance,
+        )
+
+    def pictures() -> "Iterable[tuple[str, Figure]]":
+        from handeye.evaluation.plots import coverage_figure  # noqa: PLC0415
+
+        yield "coverage", coverage_figure(result)
+
+    document = result.to_dict()
+    written = _write(trials.output, "coverage", document, pictures)
+
+    def show(console: "Console") -> None:
+        from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
+
+        tables.show_title(console, "Simulated calibrations", document)
+        tables.show_kinds(console, document["kinds"])
+        tables.show_written(console, written)
+
+    return Answer(document, show)
+
+
+def _check_folder(path: Path | None) -> None:
+    """Refuse a folder that cannot be made, before the work rather than after it."""
+    if path is None:
+        return
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"{path}: cannot be made a folder ({(error.strerror or str(error)).lower()})"
+        ) from error
+
+
+def _write(
+    folder: Path | None,
+    name: str,
+    document: Mapping[str, Any],
+    pictures: "Callable[[], Iterable[tuple[str, Figure]]]",
+) -> list[Path]:
+    if folder is None:
+        return []
+    written = [folder / f"{name}.json"]
+    write_json(written[0], document)
+    for picture, figure in pictures():
+        written.append(folder / f"{picture}.png")
+        write_figure(written[-1], figure)
+    return written
