@@ -55,6 +55,8 @@ pub struct Posterior {
 const STEP_TOLERANCE: f64 = 1e-9;
 /// Hypotheses less likely than this share of the best are not worth their covariance.
 const NEGLIGIBLE: f64 = 1e-6;
+/// Logarithm of a ratio of probabilities beyond which a hypothesis is not looked at again.
+const HOPELESS: f64 = 50.0;
 
 struct Linear {
     information: DMatrix<f64>,
@@ -107,12 +109,12 @@ pub fn estimate(
     }
     let (mut x, mut y) = start;
     let mut focus: Option<Vec<usize>> = None;
+    let mut worth: Vec<usize> = (0..hypotheses.len()).collect();
     let mut outcome = None;
     // Linearise under the likeliest hypotheses first; the whole grid is weighed once the chain stands.
     for round in 0..=options.linearisations {
         let last = round == options.linearisations;
-        let all: Vec<usize> = (0..hypotheses.len()).collect();
-        let chosen = if last { all } else { focus.clone().unwrap_or(all) };
+        let chosen = if last { worth.clone() } else { focus.clone().unwrap_or_else(|| worth.clone()) };
         let prepared = prepare(views, variances_px2, &x, &y, options.joints.as_ref());
         let camera = camera_terms(views, variances_px2, &options.camera_prior);
         // Hypotheses that differ only in the offsets stand side by side and share the sums over views.
@@ -132,6 +134,10 @@ pub fn estimate(
         let best = evaluated.iter().map(|e| e.2).fold(f64::NEG_INFINITY, f64::max);
         if evaluated.is_empty() || !best.is_finite() {
             return Err(Error::numerical("no noise level explains these views"));
+        }
+        if round == 0 && options.joints.is_some() {
+            // Offsets multiply the grid; what is hopeless at the first linearisation stays so.
+            worth = evaluated.iter().filter(|e| e.2 > best - HOPELESS).map(|e| e.0).collect();
         }
         let total: f64 = evaluated.iter().map(|e| (e.2 - best).exp()).sum();
         let mut mean = DVector::zeros(12 + n_c + n_q);
