@@ -5,7 +5,7 @@ accepted: nothing here needs escaping, and nothing can be smuggled in.
 """
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from handeye.errors import InputError
 from handeye.types import Mounting, Pose
@@ -97,13 +97,3 @@ class Frames:
         if mounting is Mounting.EYE_IN_HAND:
             return cls(parent="tool0", robot="base")
         return cls(parent="base", robot="tool0")
-
-    def renamed(self, **names: str | None) -> "Frames":
-        """Return the frames with other names; None leaves a name as it is.
-
-        Raises
-        ------
-        InputError
-            As the class.
-        """
-        return replace(self, **{key: name for key, name in names.items() if name is not None})
