@@ -105,6 +105,18 @@ def test_validate(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     )
 
 
+def test_export(handeye: Handeye, shipped: Path) -> None:
+    compare(
+        "handeye export",
+        handeye.json("export", shipped, "--format", "urdf"),
+        handeye.json("export", shipped, "--format", "moveit_samples"),
+    )
+
+
+def test_target(handeye: Handeye, tmp_path: Path) -> None:
+    compare("handeye target", handeye.json("target", "chessboard", "--output", tmp_path / "board.svg"))
+
+
 def test_demo(handeye: Handeye, tmp_path: Path) -> None:
     compare("handeye demo", handeye.json("demo", "--starts", "1", "--picture", tmp_path / "demo.png"))
     assert (tmp_path / "demo.png").stat().st_size > 10_000
