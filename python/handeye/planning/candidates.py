@@ -14,10 +14,11 @@ from handeye.types.view import View
 
 @dataclass(frozen=True)
 class Candidate:
-    """A robot pose that could be taken, by name."""
+    """A robot pose that could be taken, by name, with the joint positions that reach it if they are known."""
 
     name: str
     T_base_flange: Pose
+    joints_rad: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Pool:
     @classmethod
     def of_views(cls, views: Iterable[View]) -> "Pool":
         """Return the robot poses of recorded views."""
-        return cls(tuple(Candidate(view.name, view.T_base_flange) for view in views))
+        return cls(tuple(Candidate(view.name, view.T_base_flange, view.joints_rad) for view in views))
 
     @classmethod
     def of_poses(cls, poses: Sequence[Pose], prefix: str = "candidate") -> "Pool":
@@ -60,6 +61,14 @@ class Pool:
     def motions(self, mounting: Mounting) -> FloatArray:
         """(N, 4, 4) A of the chain of each candidate."""
         return np.array([mounting.chain(c.T_base_flange).matrix for c in self.candidates]).reshape(-1, 4, 4)
+
+    @property
+    def joints(self) -> FloatArray | None:
+        """(N, n) joint positions of the candidates; None if those of any are not known."""
+        known = [candidate.joints_rad for candidate in self.candidates if candidate.joints_rad is not None]
+        if len(known) < len(self) or len({len(joints) for joints in known}) != 1:
+            return None
+        return np.array(known, dtype=float)
 
     @property
     def positions(self) -> FloatArray:

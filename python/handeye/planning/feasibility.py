@@ -130,7 +130,12 @@ class Generator:
         width = len(str(len(joints)))
         names = [f"{prefix}_{i:0{width}d}" for i in range(1, len(joints) + 1)]
         poses = self.arm.forward(joints) if len(joints) else np.zeros((0, 4, 4))
-        pool = Pool(tuple(Candidate(name, Pose(pose)) for name, pose in zip(names, poses, strict=True)))
+        pool = Pool(
+            tuple(
+                Candidate(name, Pose(pose), tuple(q.tolist()))
+                for name, pose, q in zip(names, poses, joints, strict=True)
+            )
+        )
         found = {name: count for name, count in turned_down.items() if count > 0}
         return FeasiblePool(pool, dict(zip(names, joints, strict=True)), found, sight)
 

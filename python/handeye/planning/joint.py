@@ -93,7 +93,8 @@ def plan_jointly(
         )
     hypothesis = estimate.hypotheses[0]
     predictor = estimate.predictor(hypothesis, sight or Sight())
-    informations = predictor.informations(pool.motions(estimate.mounting))
+    jacobians = estimate.jacobians(pool.joints)
+    informations = predictor.informations(pool.motions(estimate.mounting), jacobians=jacobians)
     feasible = np.flatnonzero(np.trace(informations, axis1=1, axis2=2) > 0)
     if not 1 <= count <= len(feasible):
         raise InputError(

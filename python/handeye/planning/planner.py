@@ -141,7 +141,11 @@ class Planner:
             return np.zeros(0)
         motions = self._pool.motions(self._measurements.mounting)
         return self._estimate.gains(
-            self._options.criterion, motions, self._options.sight, over_posterior=self._is_young()
+            self._options.criterion,
+            motions,
+            self._options.sight,
+            joints=self._pool.joints,
+            over_posterior=self._is_young(),
         )
 
     def _is_young(self) -> bool:

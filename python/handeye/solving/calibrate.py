@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from handeye.errors import DegenerateError
-from handeye.solving.auto import AutoEstimator
+from handeye.solving.auto import AutoEstimator, AutoOptions
 from handeye.solving.blame import blame
 from handeye.solving.estimate import Estimate, Estimator, regular_information
 from handeye.solving.initialize import check_views
@@ -13,15 +13,24 @@ from handeye.solving.measurements import Measurements
 from handeye.solving.paper import paper_estimate
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName, ViewResult
+from handeye.types.kinematics import Kinematics
 from handeye.types.recording import Recording
 
 
-def make_estimator(model: ModelName) -> Estimator:
-    """Return what estimates under a model's assumptions."""
-    return paper_estimate if ModelName(model) is ModelName.PAPER else AutoEstimator()
+def make_estimator(model: ModelName, kinematics: Kinematics | None = None) -> Estimator:
+    """Return what estimates under a model's assumptions; the paper's model has no use for the arm."""
+    if ModelName(model) is ModelName.PAPER:
+        return paper_estimate
+    return AutoEstimator(AutoOptions(kinematics=kinematics))
 
 
-def solve(recording: Recording, model: ModelName = ModelName.AUTO, *, reduced: bool = False) -> Calibration:
+def solve(
+    recording: Recording,
+    model: ModelName = ModelName.AUTO,
+    *,
+    reduced: bool = False,
+    kinematics: Kinematics | None = None,
+) -> Calibration:
     """Calibrate from all usable views of a recording.
 
     Parameters
@@ -33,26 +42,34 @@ def solve(recording: Recording, model: ModelName = ModelName.AUTO, *, reduced: b
     reduced
         Answer even where the views leave directions open: these are listed in `unobservable`, a weak prior
         stands in for them, and the covariance says so. An arm with four axes can only be calibrated so.
+    kinematics
+        The arm, if it is known: errors of its joints are then part of the model. Every view must have joint
+        positions.
 
     Raises
     ------
     InputError
-        Fewer than three usable views.
+        Fewer than three usable views, or views without the joint positions that the arm needs.
     DegenerateError
         The views do not determine the answer, and it was not asked for reduced; the message names what they
         leave open, the hint how to cure it.
     SolveError
         No minimum was found.
     """
-    return calibrate(Measurements.of_recording(recording), ModelName(model), reduced=reduced)
+    measurements = Measurements.of_recording(recording)
+    return calibrate(measurements, ModelName(model), reduced=reduced, kinematics=kinematics)
 
 
 def calibrate(
-    measurements: Measurements, model: ModelName = ModelName.AUTO, *, reduced: bool = False
+    measurements: Measurements,
+    model: ModelName = ModelName.AUTO,
+    *,
+    reduced: bool = False,
+    kinematics: Kinematics | None = None,
 ) -> Calibration:
     """Calibrate from measurements; see `solve`."""
     check_views(measurements)
-    estimate = make_estimator(model)(measurements)
+    estimate = make_estimator(model, kinematics)(measurements)
     if not reduced:
         require_determined(estimate)
     calibration = to_calibration(measurements, estimate)
@@ -101,6 +118,7 @@ def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibratio
         views=tuple(views),
         unobservable=estimate.unobservable,
         degrees_of_freedom=estimate.degrees_of_freedom,
+        joint_offsets=estimate.joint_offsets,
     )
 
 
