@@ -23,7 +23,7 @@ class ArmErrors:
     encoder_sigma_rad
         New at every motion.
     offset_sigma_rad
-        Constant offsets of the joints.
+        Constant offsets of the joints but the first and the last: theirs only say where base and flange are.
     length_sigma_m, twist_sigma_rad
         Constant errors of where each joint sits on the link before it.
     flange_sigma_m, flange_sigma_rad, base_sigma_m, base_sigma_rad
@@ -83,6 +83,7 @@ class SimulatedArm:
         self._seed = seed
         random = np.random.default_rng([seed, 1])
         self._offsets = errors.offset_sigma_rad * random.standard_normal(len(arm))
+        self._offsets[[0, -1]] = 0.0
         self._true = _built_wrong(arm, errors, random)
         self._commanded = np.array(start_rad, dtype=np.float64)
         self._T_base_flange = self._stand(self._commanded, self._commanded, "start")

@@ -1,0 +1,182 @@
+"""The closed loop on simulated cells: it reaches what was asked for, and faults end in words, not in numbers."""
+
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handeye.cameras.simulated import Optics
+from handeye.datasets import read_recording
+from handeye.errors import DeviceError, InputError
+from handeye.robots import open_arm
+from handeye.robots.protocol import Goal
+from handeye.session.attempt import Missed, Patience, attempt
+from handeye.session.configuration import Configuration, Prepared, begin, prepare
+from handeye.session.entry import Failure
+from handeye.session.faults import FaultRates
+from handeye.session.loop import End, EndReason, Session, Wish
+from handeye.session.patience import within
+from handeye.session.simulated import SimulationOptions, simulated_cell
+from handeye.session.store import SessionStore, create_session
+from handeye.solving import solve
+from handeye.types import Chessboard, CircleGrid, Mounting, Pose
+from sessions import configured
+
+
+def ended(configuration: Configuration, folder: Path) -> tuple[End, Prepared, SessionStore]:
+    prepared = prepare(configuration)
+    session, store = begin(prepared, folder)
+    end = session.run()
+    store.close()
+    return end, prepared, store
+
+
+def true_error(end: End, prepared: Prepared) -> tuple[float, float]:
+    assert end.calibration is not None
+    assert prepared.truth is not None
+    assert prepared.truth.X is not None
+    off = (end.calibration.X @ prepared.truth.X.inverse()).log()
+    return 1e3 * float(np.linalg.norm(off[:3])), float(np.rad2deg(np.linalg.norm(off[3:])))
+
+
+@pytest.mark.parametrize("mounting", list(Mounting))
+@pytest.mark.parametrize("robot", ["epson_c4l", "ur5e"])
+def test_it_reaches_what_was_asked_for(robot: str, mounting: Mounting, tmp_path: Path) -> None:
+    end, prepared, store = ended(configured(5, robot=robot, mounting=mounting), tmp_path / "s")
+    assert end.reason is EndReason.ACCURACY_REACHED
+    assert end.reach is not None
+    assert end.reach.translation_mm <= 0.5
+    millimetres, degrees = true_error(end, prepared)
+    assert millimetres < 1.0
+    assert degrees < 0.1
+    # The session is a recording, and solves to the same answer.
+    recording = read_recording(tmp_path / "s").recording
+    assert recording == store.recording
+    assert end.calibration is not None
+    assert np.array_equal(solve(recording).X.matrix, end.calibration.X.matrix)
+    # No proposal left the limits or touched anything.
+    assert end.calibration is not None
+    for entry in store.entries:
+        assert prepared.arm.within_limits(entry.goal_joints)
+        assert prepared.cell.workspace.contains(entry.goal.translation)
+
+
+def test_a_camera_that_renders_and_a_detector_that_detects(tmp_path: Path) -> None:
+    options = SimulationOptions(seed=4, target=Chessboard(5, 7, 0.03), camera_error=0.0, optics=Optics())
+    made = simulated_cell(open_arm("epson_c4l"), options)
+    store = create_session(tmp_path / "s", made.recording, {})
+    end = Session(made.cell, store, made.start, Wish(most_views=3, seed=4)).run()
+    store.close()
+    assert end.views == 3
+    loaded = read_recording(tmp_path / "s")
+    assert all(view.image is not None for view in loaded.recording.views)
+    assert end.calibration is not None
+    assert made.truth.X is not None
+    assert (end.calibration.X @ made.truth.X.inverse()).rotation_angle_rad < np.deg2rad(0.5)
+
+
+def test_labels_of_a_board_that_looks_the_same_when_turned(tmp_path: Path) -> None:
+    target = CircleGrid(4, 4, 0.04, 0.02)
+    options = SimulationOptions(seed=8, target=target, optics=Optics(points_only=0.05))
+    made = simulated_cell(open_arm("epson_c4l"), options)
+
+    class Turning:
+        """Labels the points anew in every picture, as a detector that cannot tell may."""
+
+        def __init__(self) -> None:
+            self.count = 0
+
+        def grab(self, label: str) -> object:
+            frame = made.cell.source.grab(label)
+            assert frame.points is not None
+            self.count += 1
+            turn = target.symmetries[self.count % len(target.symmetries)]
+            points = replace(frame.points, point_ids=turn[frame.points.point_ids])
+            return replace(frame, points=points)
+
+    cell = replace(made.cell, source=Turning())
+    store = create_session(tmp_path / "s", made.recording, {})
+    end = Session(cell, store, made.start, Wish(seed=8)).run()
+    store.close()
+    assert end.reason is EndReason.ACCURACY_REACHED
+    assert end.views == end.attempts
+
+
+# Pairs, as each run takes its time.
+FAULTS = [
+    {"refused": Failure.MOTION_REFUSED, "not_found": Failure.NOT_FOUND},
+    {"robot_dies": Failure.ROBOT_FAILED, "camera_hangs": Failure.CAMERA_TIMEOUT},
+    {"camera_fails": Failure.CAMERA_FAILED, "stale": Failure.STALE_IMAGE},
+    {"garbage": Failure.INCONSISTENT, "off_target": None},
+]
+
+
+@pytest.mark.parametrize("faults", FAULTS, ids="-".join)
+def test_each_fault_is_noticed_named_and_overcome(faults: dict[str, Failure | None], tmp_path: Path) -> None:
+    rates = FaultRates(**dict.fromkeys(faults, 0.3))
+    patience = Patience(grab_s=0.1)
+    configuration = configured(13, faults=rates, hang_s=0.3, patience=patience, failures_in_a_row=20)
+    end, prepared, store = ended(configuration, tmp_path / "s")
+    assert end.reason is EndReason.ACCURACY_REACHED
+    assert true_error(end, prepared)[0] < 1.0
+    reasons = {entry.failure for entry in store.entries if entry.failure is not None}
+    for failure in faults.values():
+        if failure is None:
+            assert any("the pose read back is used" in entry.detail for entry in store.entries)
+        else:
+            assert failure in reasons
+
+
+def test_a_fault_that_stays_is_a_clear_stop_without_an_answer(tmp_path: Path) -> None:
+    dead = configured(0, faults=FaultRates(camera_fails=1.0), failures_in_a_row=5)
+    end, _, _ = ended(dead, tmp_path / "dead")
+    assert (end.reason, end.attempts, end.calibration) == (EndReason.TOO_MANY_FAILURES, 5, None)
+    assert "grab failed" in end.sentence
+    blind = configured(0, faults=FaultRates(not_found=1.0))
+    end, _, _ = ended(blind, tmp_path / "blind")
+    assert (end.reason, end.calibration) == (EndReason.NO_START, None)
+
+
+def test_nothing_moves_outside_the_workspace_or_unconfirmed() -> None:
+    prepared = prepare(configured(0))
+    assert prepared.hidden_arm is not None
+    stands = prepared.hidden_arm.hidden_pose
+    loop_goal = _goal(prepared)
+    tiny = replace(prepared.cell.workspace, upper_m=np.array([0.1, 0.1, 0.1]))
+    outside = attempt(replace(prepared.cell, workspace=tiny), loop_goal, frozenset(), {})
+    asked = attempt(replace(prepared.cell, confirm=lambda _: False), loop_goal, frozenset(), {})
+    for outcome, failure in ((outside, Failure.MOTION_REFUSED), (asked, Failure.NOT_CONFIRMED)):
+        assert isinstance(outcome, Missed)
+        assert outcome.failure is failure
+    assert prepared.hidden_arm.hidden_pose is stands
+    with pytest.raises(InputError, match="no workspace"):
+        prepare(
+            replace(configured(0), driver="manual"), camera=prepared.cell.camera, target=prepared.cell.target
+        )
+
+
+def _goal(prepared: Prepared) -> Goal:
+    joints = np.array(prepared.start.joints_rad) + 0.05
+    return Goal("view_01.1", Pose(prepared.arm.forward(joints)), tuple(joints.tolist()))
+
+
+def test_a_driver_that_hangs_or_raises_becomes_an_error_of_ours() -> None:
+    with pytest.raises(DeviceError, match=r"no answer within 0\.05 s"):
+        within(0.05, "camera", threading.Event().wait, 1.0)
+    with pytest.raises(DeviceError, match="ZeroDivisionError"):
+        within(1.0, "camera", lambda: 1 // 0)
+    assert within(1.0, "camera", int, "7") == 7
+
+
+def test_the_decisions_say_how_they_came_about(tmp_path: Path) -> None:
+    end, _, store = ended(configured(5), tmp_path / "s")
+    planned = [entry for entry in store.entries if entry.phase == "plan"]
+    assert planned
+    for entry in planned:
+        candidates = entry.decision["candidates"]
+        assert max(candidates.values()) == pytest.approx(entry.decision["predicted_gain"], abs=1e-5)
+        assert entry.decision["turned_down"]
+        assert entry.decision["margin_px"] >= 20.0
+    assert end.views >= len(planned)

@@ -1,0 +1,88 @@
+"""Running simulated sessions, also in processes that are killed."""
+
+import os
+import signal
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handeye.robots.simulated import ArmErrors
+from handeye.session.configuration import Configuration, Simulation, begin, go_on, prepare
+from handeye.session.loop import End
+from handeye.session.store import is_session, open_session
+
+QUICK = Configuration("epson_c4l", simulation=Simulation(points_only=0.1))
+
+
+def configured(seed: int = 0, errors: ArmErrors | None = None, **changes: Any) -> Configuration:
+    """Return a quick run: points instead of pictures."""
+    changed = {name: value for name, value in changes.items() if hasattr(QUICK, name)}
+    inner = {name: value for name, value in changes.items() if name not in changed}
+    simulation = replace(QUICK.simulation, **inner)
+    if errors is not None:
+        simulation = replace(simulation, errors=errors)
+    return replace(QUICK, seed=seed, simulation=simulation, **changed)
+
+
+def run(configuration: Configuration, folder: Path) -> End:
+    """Run to the end, from the beginning or from where it broke off."""
+    if is_session(folder):
+        session, store, _ = go_on(folder)
+    else:
+        session, store = begin(prepare(configuration), folder)
+    try:
+        return session.run()
+    finally:
+        store.close()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Everything that must not depend on breaks."""
+
+    journal: list[dict[str, Any]]
+    recording: dict[str, Any]
+    images: dict[str, bytes]
+
+    @classmethod
+    def of(cls, folder: Path) -> "Outcome":
+        store = open_session(folder)
+        try:
+            journal = [entry.to_dict() for entry in store.entries]
+            recording = store.recording.to_dict()
+        finally:
+            store.close()
+        for entry in journal:
+            del entry["timings_s"]
+        images = {path.name: path.read_bytes() for path in sorted((folder / "images").glob("*.png"))}
+        return cls(journal, recording, images)
+
+
+def run_killed(configuration: Configuration, folder: Path, random: np.random.Generator, mean_s: float) -> int:
+    """Run to the end in processes that are killed after a random time each; return the number of kills."""
+    kills = 0
+    while True:
+        child = os.fork()
+        if child == 0:
+            code = 1
+            try:
+                run(configuration, folder)
+                code = 0
+            finally:
+                os._exit(code)
+        deadline = time.monotonic() + random.exponential(mean_s)
+        while time.monotonic() < deadline:
+            pid, status = os.waitpid(child, os.WNOHANG)
+            if pid:
+                if os.waitstatus_to_exitcode(status) != 0:
+                    raise AssertionError(f"a run failed with {os.waitstatus_to_exitcode(status)}")
+                return kills
+            time.sleep(0.001)
+        os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        if os.WIFEXITED(status) and os.WEXITSTATUS(status) == 0:
+            return kills
+        kills += 1
