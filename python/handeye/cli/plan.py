@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from handeye import _core
 from handeye.cli.answer import Answer
+from handeye.cli.arm import ArmSource
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
@@ -67,6 +68,7 @@ def plan(
     fewest: int | None = None,
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
+    arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Rank the views to take next, each with the accuracy predicted after it.
@@ -123,7 +125,8 @@ def plan(
     warnings = (*opened.warnings, *(() if table is None else table.warnings))
     with mindful_of(warnings):
         start = measurements.select([names.index(name) for name in taken])
-        planner = Planner(start, pool, make_estimator(model), options)
+        estimator = make_estimator(model, arm.kinematics(opened.recording, model))
+        planner = Planner(start, pool, estimator, options)
         ranking = rank(planner.estimate, planner.pool, worth, sight, gains=planner.gains(), top=top)
     # The planner leaves out what is taken; a person may wonder where it is.
     again = {name: "a view of this name is taken already" for name in taken if name in _names(pool)}

@@ -3,14 +3,17 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from handeye.cli.answer import Answer
+from handeye.cli.arm import ArmSource
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.source import Source, mindful_of
 from handeye.evaluation.region import Ellipsoid, position_region
 from handeye.importing import Opened
 from handeye.solving import solve as solve_recording
-from handeye.types.calibration import Calibration, ModelName, RobotSide
+from handeye.types.calibration import Calibration, JointOffset, ModelName, RobotSide
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,6 +27,7 @@ def solve(
     reduced: bool = False,
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
+    arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Calibrate from a folder of views.
@@ -46,7 +50,8 @@ def solve(
     check_output(output)
     opened = source.open(folder)
     with mindful_of(opened.warnings):
-        calibration = solve_recording(opened.recording, model, reduced=reduced)
+        kinematics = arm.kinematics(opened.recording, model)
+        calibration = solve_recording(opened.recording, model, reduced=reduced, kinematics=kinematics)
     region = position_region(calibration)
     data = _data(opened, calibration, region)
     if output is not None:
@@ -118,6 +123,7 @@ def _show(
             ("95 % region", f"position within an ellipsoid of semi-axes {axes} mm"),
             ("residuals", residuals),
             ("noise", _noise(calibration)),
+            *((f"joint {offset.joint}", _offset(offset)) for offset in calibration.joint_offsets),
             ("camera", camera_line(opened)),
         ],
     )
@@ -127,6 +133,13 @@ def _show(
     notices(console, "Warnings", [*map(str, opened.warnings), *calibration.warnings])
     if output is not None:
         console.print(f"written: {output}")
+
+
+def _offset(offset: JointOffset) -> str:
+    values = offset.to_dict()
+    unit = "mm" if offset.sliding else "deg"
+    value, sigma = values[f"offset_{unit}"], values[f"sigma_{unit}"]
+    return f"{value:+.4f} {unit} beyond where it is read, give or take {sigma:.4f}"
 
 
 def _noise(calibration: Calibration) -> str:
@@ -139,4 +152,7 @@ def _noise(calibration: Calibration) -> str:
     share = noise.evidence.get(noise.robot_side.value)
     certainty = "" if share is None else f" (probability {'over 99 %' if share > 0.99 else f'{share:.0%}'})"
     robot = both(noise.robot_translation_m, noise.robot_rotation_rad)
+    if noise.robot_side is RobotSide.JOINTS:
+        joints = f"from {figures(float(np.rad2deg(noise.joint_rad)), 2)} deg in every joint"
+        return f"{pixel}; robot {robot} per axis at the flange, {joints}{certainty}"
     return f"{pixel}; robot {robot} per axis, on the side of the {noise.robot_side}{certainty}"
