@@ -13,6 +13,7 @@ import numpy as np
 from handeye import _core
 from handeye.solving.auto import CameraPrior, camera_prior
 from handeye.solving.estimate import Estimate, side_of_chain
+from handeye.solving.joints import JointModel
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Finding, RobotSide
@@ -72,6 +73,7 @@ def suspects(measurements: Measurements, estimate: Estimate) -> tuple[Suspect, .
         found.append(
             Suspect(f"robot_{side.value}", f"the robot ({side.value} side)", evidence - exact, words)
         )
+    found += _joints(measurements, estimate, calibrated, exact)
     fixed, reference = _evidence(measurements, estimate, CameraPrior((), np.zeros((0, 0))))
     noise = _robot_noise(reference)
     prior = camera_prior(measurements.camera, CAMERA_BLAME_INFLATION)
@@ -105,6 +107,31 @@ def suspects(measurements: Measurements, estimate: Estimate) -> tuple[Suspect, .
         left = _robot_noise(posterior) / noise
         found.append(Suspect("time_lag", "a lag between poses and images", evidence - fixed, words, left))
     return tuple(found)
+
+
+def _joints(
+    measurements: Measurements, estimate: Estimate, calibrated: CameraPrior, exact: float
+) -> list[Suspect]:
+    """Noise and offsets of the joints of a robot that is exact otherwise; nothing if the arm is not known."""
+    if estimate.kinematics is None:
+        return []
+    arm = JointModel.of(estimate.kinematics, measurements)
+    noise = arm.errors(None, 0.0)
+    evidence, posterior = _evidence(
+        measurements, estimate, calibrated, sides=[], joints=noise, exact_robot=0.0
+    )
+    level, _ = posterior.joint_levels[0]
+    words = f"each is off by about {np.rad2deg(level):.2g} deg, another way at each view"
+    found = [Suspect("robot_joint_noise", "noise of the joints", evidence - exact, words)]
+    if not arm.free:
+        return found
+    offsets = arm.errors(0.0, None)
+    evidence, posterior = _evidence(measurements, estimate, calibrated, sides=[], joints=offsets)
+    worst = max(arm.offsets(posterior.joint_offsets, posterior.covariance), key=lambda o: abs(o.offset))
+    value = f"{worst.offset * 1e3:+.2g} mm" if worst.sliding else f"{np.rad2deg(worst.offset):+.2g} deg"
+    words = f"{worst.joint} stands {value} beyond where it is read"
+    found.append(Suspect("robot_joint_offsets", "a constant error of the joints", evidence - exact, words))
+    return found
 
 
 def time_lag_jacobians(measurements: Measurements) -> FloatArray | None:
@@ -150,7 +177,7 @@ def blame(measurements: Measurements, estimate: Estimate) -> Finding:
             "the robot would be blamed for",
             evidence,
         )
-    best, second = sorted(robots, key=lambda s: -s.log_evidence)
+    best, second = sorted(robots, key=lambda s: -s.log_evidence)[:2]
     if best.log_evidence < DECISIVE:
         return Finding("blame_nothing", "pixel noise alone explains these views", evidence)
     unsure = best.log_evidence - second.log_evidence < DECISIVE
@@ -173,10 +200,12 @@ def _evidence(
     sides: list[str] | None = None,
     board_scale: bool = False,
     joints: _core.JointErrors | None = None,
+    exact_robot: float | None = None,
 ) -> tuple[float, _core.Posterior]:
     """Return the logarithm of the evidence of one hypothesis, and its posterior.
 
-    `sides`: where the robot may err; None for anywhere or nowhere, empty for nowhere.
+    `sides`: where the robot may err; None for anywhere or nowhere, empty for nowhere. `exact_robot`: prior
+    probability that it is exact, if not what follows from this.
     """
     free = prior.information.size > 0
     compressed = _core.Compressed(
@@ -188,7 +217,9 @@ def _evidence(
     posterior = compressed.estimate(
         camera_prior=prior.information if free else None,
         start=(estimate.X.matrix, estimate.Y.matrix),
-        exact_probability=_EXACT_PROBABILITY[None if sides is None else len(sides)],
+        exact_probability=_EXACT_PROBABILITY[None if sides is None else len(sides)]
+        if exact_robot is None
+        else exact_robot,
         sides=sides,
         joints=joints,
         linearisations=10,
