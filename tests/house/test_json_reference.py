@@ -122,6 +122,18 @@ def test_demo(handeye: Handeye, tmp_path: Path) -> None:
     assert (tmp_path / "demo.png").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize("study", ["table1", "curves", "holdout", "injected"])
+def test_studies(handeye: Handeye, study: str) -> None:
+    arguments = ("--data", shipped_recording().parent, "--sets", shipped_recording().name)
+    options = ("--trials", "1", "--workers", "1")
+    compare(f"handeye study {study}", handeye.json("study", study, *arguments, *options))
+
+
+def test_coverage(handeye: Handeye) -> None:
+    data = handeye.json("study", "coverage", "--trials", "1", "--workers", "1")
+    compare("handeye study coverage", data)
+
+
 def test_errors(handeye: Handeye) -> None:
     outcome = handeye("solve", "nowhere", "--json")
     compare("Errors", outcome.data)
