@@ -72,6 +72,7 @@ class Configuration:
     policy: str = "next_best_view"
     speed_rad_s: float = 0.5
     failures_in_a_row: int = 10
+    joints_err: bool = True
     workspace_m: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     floor_m: float = 0.0
     limits: ViewLimits = field(default_factory=ViewLimits)
@@ -93,6 +94,7 @@ class Configuration:
             ModelName(self.model),
             self.failures_in_a_row,
             speed_rad_s=self.speed_rad_s,
+            joints_err=self.joints_err,
             policy=make_policy(self.policy),
         )
 
@@ -169,6 +171,7 @@ def prepare(
     DeviceError
         A driver fails.
     """
+    configuration.wish()  # refused now rather than once the arm has moved
     arm = open_arm(configuration.robot)
     if configuration.is_simulated:
         return _simulated(configuration, arm, target, confirm)

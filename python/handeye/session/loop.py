@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from handeye.detection import Detection
-from handeye.errors import HandeyeError, OutputError
+from handeye.errors import HandeyeError, InputError, OutputError
 from handeye.planning import Planner, PlannerOptions, Stop, StopReason
 from handeye.planning.feasibility import FeasiblePool, Generator, ViewLimits
 from handeye.planning.policies import Policy
 from handeye.planning.policies.next_best_view import NextBestView
 from handeye.planning.stopping import NumberOfViews, StopRule
+from handeye.robots import ArmKinematics
 from handeye.robots.protocol import Goal, Reading
 from handeye.session.attempt import Cell, Missed, Seen, attempt, encoded
 from handeye.session.entry import TRANSIENT, Entry, Failure
@@ -62,6 +63,13 @@ class Wish:
         Attempts at one goal where nothing says that the place is to blame.
     speed_rad_s
         No joint moves faster.
+    joints_err
+        Weigh noise and offsets of the joints as causes of error: the description of the arm is known anyway.
+
+    Raises
+    ------
+    InputError
+        A value out of its range.
     """
 
     accuracy_mm: float | None = 0.5
@@ -72,7 +80,20 @@ class Wish:
     failures_in_a_row: int = 10
     tries_at_a_place: int = 3
     speed_rad_s: float = 0.5
+    joints_err: bool = True
     policy: Policy = field(default_factory=NextBestView)
+
+    def __post_init__(self) -> None:
+        self.rules()  # checks what they check
+        if not 0 < self.speed_rad_s < float("inf") or min(self.failures_in_a_row, self.tries_at_a_place) < 1:
+            raise InputError("a speed above zero and at least one attempt are needed", code="out_of_range")
+
+    def rules(self) -> tuple[StopRule, ...]:
+        """Return when to stop, in the order asked."""
+        number = NumberOfViews(self.most_views)
+        if self.accuracy_mm is None or self.accuracy_deg is None:
+            return (number,)
+        return Requested(self.accuracy_mm, self.accuracy_deg), number
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +155,9 @@ class Session:
         self._wish = wish
         self._generator = Generator(cell.arm, cell.workspace, limits or ViewLimits())
         self._progress = progress
-        self._estimator: Estimator = make_estimator(wish.model)
+        known = wish.joints_err and wish.model is ModelName.AUTO
+        self._kinematics = ArmKinematics(cell.arm) if known else None
+        self._estimator: Estimator = make_estimator(wish.model, self._kinematics)
         self._measurements = Measurements.of(store.recording.mounting, cell.camera, cell.target)
 
     def run(self) -> End:
@@ -247,7 +270,7 @@ class Session:
         ]
         drawn = self._generator.draw(estimate, postures, random, shunned=shunned)
         options = PlannerOptions(
-            policy=self._wish.policy, stop_rules=self._rules(), sight=drawn.sight, seed=self._wish.seed
+            policy=self._wish.policy, stop_rules=self._wish.rules(), sight=drawn.sight, seed=self._wish.seed
         )
         planner = Planner(measurements, drawn.pool, _known(estimate), options)
         body = self._generator.body(estimate)
@@ -275,13 +298,6 @@ class Session:
             else EndReason.VIEWS_TAKEN
         )
         return self._end(reason, answer.sentence)
-
-    def _rules(self) -> tuple[StopRule, ...]:
-        wish = self._wish
-        rules: list[StopRule] = []
-        if wish.accuracy_mm is not None and wish.accuracy_deg is not None:
-            rules.append(Requested(wish.accuracy_mm, wish.accuracy_deg))
-        return (*rules, NumberOfViews(wish.most_views))
 
     def _goal(self, pose: Pose, joints: tuple[float, ...]) -> Goal:
         entries = self._store.entries
@@ -419,7 +435,7 @@ class Session:
         if len(measurements) >= START_VIEWS:
             estimate = self._estimator(measurements)
             if estimate.determined:
-                calibration = calibrate(measurements, self._wish.model)
+                calibration = calibrate(measurements, self._wish.model, kinematics=self._kinematics)
                 radii = reach(estimate)
         return End(reason, sentence, calibration, radii, len(views), len(entries))
 

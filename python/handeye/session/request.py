@@ -30,12 +30,13 @@ def reach(estimate: Estimate, probability: float = PROBABILITY) -> Reach:
     """
     covariance = estimate.hand_eye_covariance
     return Reach(
-        1e3 * _radius(covariance[:3, :3], estimate.degrees_of_freedom, probability),
-        float(np.rad2deg(_radius(covariance[3:, 3:], estimate.degrees_of_freedom, probability))),
+        1e3 * radius(covariance[:3, :3], estimate.degrees_of_freedom, probability),
+        float(np.rad2deg(radius(covariance[3:, 3:], estimate.degrees_of_freedom, probability))),
     )
 
 
-def _radius(covariance: FloatArray, degrees_of_freedom: float, probability: float) -> float:
+def radius(covariance: FloatArray, degrees_of_freedom: float, probability: float = PROBABILITY) -> float:
+    """Return the radius within which a vector of a covariance (3, 3) lies with a probability, in its unit."""
     # A fixed sample: the same covariance has the same radius, to a hundredth.
     random = np.random.default_rng(20)
     draws = random.standard_normal((_DRAWS, 3))

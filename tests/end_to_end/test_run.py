@@ -1,0 +1,75 @@
+"""`handeye run` from nothing to a session that other commands take, without a robot."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commands import Handeye
+from handeye.robots import open_arm
+from handeye.robots.notations import Notation, read_pose_text
+
+QUICK = ("--points-only", "0.1", "--seed", "5")
+
+
+def test_a_session_is_run_resumed_and_solved(handeye: Handeye, tmp_path: Path) -> None:
+    folder = tmp_path / "cell"
+    data = handeye.json("run", "--session", folder, *QUICK)
+    assert data["end"] == "accuracy_reached"
+    assert data["request_met"] is True
+    assert data["within_95"]["translation_mm"] <= 0.5
+    assert data["true_error"]["translation_mm"] < 1.0
+    again = handeye.json("run", "--resume", "--session", folder)
+    assert again == data
+    solved = handeye.json("solve", folder)
+    assert len(solved["views"]["used"]) == data["views"]
+    # Solving by hand need not weigh the joints; the answer is the same within what it claims.
+    off = np.array(solved["T_flange_camera"]) - np.array(data["calibration"]["T_flange_camera"])
+    assert np.abs(off[:3, 3]).max() < 1e-3
+
+
+def test_a_dry_run_moves_and_writes_nothing(handeye: Handeye, tmp_path: Path) -> None:
+    data = handeye.json("run", "--dry-run", "--session", tmp_path / "cell", "--robot", "ur5e")
+    assert not (tmp_path / "cell").exists()
+    arm = open_arm("ur5e")
+    for goal in data["first_goals"]:
+        reached = arm.forward(np.deg2rad(goal["joints_deg"]))
+        assert np.allclose(reached, goal["T_base_flange"], atol=1e-6)
+    text = handeye("run", "--dry-run").out
+    line = next(line for line in text.splitlines() if line.strip().startswith("fanuc"))
+    assert read_pose_text(line.split("fanuc")[1], Notation.FANUC).translation[2] > 0.2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        ((), 2),
+        (("--resume",), 2),
+        (("--driver", "manual"), 2),
+        (("--session", "x", "--robot", "nobody"), 3),
+        (("--session", "x", "--accuracy-mm", "-1"), 3),
+        (("--dry-run", "--driver", "manual", "--images", "opencv:0"), 3),
+        (("--session", "nowhere", "--resume"), 3),
+        (("--session", "missing/folder"), 7),
+    ],
+)
+def test_what_does_not_go_together_is_said_before_anything_moves(
+    handeye: Handeye,
+    arguments: tuple[str, ...],
+    code: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = handeye("run", *arguments)
+    assert outcome.code == code, outcome.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_fails_ends_in_words_and_can_be_resumed(handeye: Handeye, tmp_path: Path) -> None:
+    outcome = handeye(
+        "run", "--session", tmp_path / "cell", "--points-only", "0.1", "--faults", "1", "--json"
+    )
+    assert outcome.code == 8
+    assert outcome.error["code"] == "too_many_failures"
+    assert "--resume" in outcome.error["hint"]
