@@ -88,15 +88,10 @@ impl LogNormal {
 impl Default for JointPrior {
     fn default() -> Self {
         let degrees = f64::to_radians;
-        Self {
-            noise: LogNormal {
-                median: degrees(0.01),
-                spread: 1.5,
-                grid: (degrees(2.5e-4), degrees(0.25), 13),
-            },
-            offset: LogNormal { median: degrees(0.03), spread: 1.2, grid: (degrees(2e-3), degrees(0.5), 7) },
-            no_offset_probability: 0.25,
-        }
+        let noise =
+            LogNormal { median: degrees(0.01), spread: 1.5, grid: (degrees(2.5e-4), degrees(0.25), 13) };
+        let offset = LogNormal { median: degrees(0.03), spread: 1.0, grid: (degrees(4e-3), degrees(0.5), 7) };
+        Self { noise, offset, no_offset_probability: 1.0 / 3.0 }
     }
 }
 
@@ -233,6 +228,6 @@ mod tests {
         assert!((total - 1.0).abs() < 1e-12);
         let exact: f64 =
             grid.iter().filter(|h| h.offset_rad == EXACT_OFFSET_RAD).map(|h| h.log_prior.exp()).sum();
-        assert!((exact - 0.25).abs() < 1e-12);
+        assert!((exact - 1.0 / 3.0).abs() < 1e-12);
     }
 }
