@@ -114,5 +114,5 @@ fn impossible_questions_are_refused() {
     assert!(select(&base, &pool, 4, &Objective::Entropy).is_err());
     assert!(select(&base, &pool, 0, &Objective::Entropy).is_err());
     let nothing = DMatrix::zeros(12, 12);
-    assert!(select(&nothing, &[nothing.clone()], 1, &Objective::Entropy).is_err());
+    assert!(select(&nothing, std::slice::from_ref(&nothing), 1, &Objective::Entropy).is_err());
 }
