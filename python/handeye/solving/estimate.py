@@ -235,7 +235,8 @@ class Estimate:
         points = [gains]
         for X, Y in self._sigma_points():
             moved = replace(self, X=X, Y=Y)
-            points.append(np.nan_to_num(moved._gains_at(criterion, motions, sight, jacobians)))
+            there = moved._gains_at(criterion, motions, sight, jacobians)  # noqa: SLF001 - of this class
+            points.append(np.nan_to_num(there))
         return np.mean(points, axis=0)
 
     def _gains_at(
@@ -254,8 +255,9 @@ class Estimate:
         points: list[tuple[Pose, Pose]] = []
         for value, vector in list(zip(values, vectors.T, strict=True))[-SIGMA_POINT_DIRECTIONS:]:
             step = np.sqrt(SIGMA_POINT_DIRECTIONS * max(float(value), 0.0)) * vector
-            for signed in (step, -step):
-                points.append((Pose.exp(signed[:6]) @ self.X, Pose.exp(signed[6:]) @ self.Y))
+            points += [
+                (Pose.exp(signed[:6]) @ self.X, Pose.exp(signed[6:]) @ self.Y) for signed in (step, -step)
+            ]
         return points
 
 
