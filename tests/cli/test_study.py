@@ -111,7 +111,7 @@ def test_coverage_has_the_promised_keys(
     code, document = study(capsys, "coverage", "--trials", "2", "--mounting", mounting, "--output", tmp_path)
     assert code == 0
     assert document["mounting"] == mounting
-    assert set(document["kinds"]) == {kind.value for kind in ErrorKind}
+    assert set(document["kinds"]) >= {kind.value for kind in ErrorKind}
     for found in document["kinds"].values():
         assert found["trials"] == 2
         assert 0 <= found["coverage_95"] <= 1

@@ -8,8 +8,7 @@ import pytest
 from handeye import _core
 from handeye.detection import Detection, calibrate_camera
 from handeye.errors import SolveError
-from handeye.evaluation.arm import Arm
-from handeye.evaluation.simulate import POSTURE_RAD, CellOptions, ErrorKind, camera_information, simulate
+from handeye.evaluation.simulate import CellOptions, ErrorKind, camera_information, simulate, simulated_arm
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording
 
 NO_PIXELS = CellOptions(pixel_sigma_px=(1e-9, 1e-9), views=(8, 8))
@@ -90,31 +89,12 @@ def test_impossible_cells_are_refused() -> None:
         simulate(ErrorKind.PIXEL_ONLY, 0, CellOptions(distance_m=(3.0, 4.0)))
 
 
-def test_the_jacobian_of_the_arm_is_its_derivative() -> None:
-    arm, step = Arm(), 1e-6
-    joints = POSTURE_RAD + 0.3
-    for i in range(6):
-        change = step * np.eye(6)[i]
-        difference = arm.forward(joints + change) @ np.linalg.inv(arm.forward(joints - change))
-        column = _core.se3_log(difference[np.newaxis])[0] / (2 * step)
-        np.testing.assert_allclose(arm.jacobian(joints)[:, i], column, atol=1e-9)
-
-
-def test_the_arm_finds_back_to_where_it_was() -> None:
-    arm = Arm()
-    random = np.random.default_rng(5)
-    for _ in range(20):
-        joints = POSTURE_RAD + random.uniform(-0.4, 0.4, 6)
-        found = arm.inverse(arm.forward(joints), POSTURE_RAD)
-        np.testing.assert_allclose(arm.forward(found), arm.forward(joints), atol=1e-9)
-    with pytest.raises(SolveError, match="far"):
-        arm.inverse(Pose.exp([2.0, 0, 0, 0, 0, 0]).matrix, POSTURE_RAD)
-
-
-def test_the_arm_is_as_long_as_published() -> None:
-    # Stretched out along -x: the sum of both links, the wrist beside and below it.
-    flange = Arm().forward(np.zeros(6))
-    np.testing.assert_allclose(flange[:3, 3], [-0.8172, -0.1333 - 0.0996, 0.1625 - 0.0997], atol=1e-12)
+@pytest.mark.parametrize("kind", [ErrorKind.ENCODER, ErrorKind.JOINT_OFFSETS])
+def test_the_robot_reports_the_pose_of_the_joints_it_reads(kind: ErrorKind) -> None:
+    recording = simulate(kind, 2, NO_PIXELS)
+    joints = np.array([view.joints_rad for view in recording.views])
+    reported = np.array([view.T_base_flange.matrix for view in recording.views])
+    np.testing.assert_allclose(simulated_arm().forward(joints), reported, atol=1e-12)
 
 
 def test_camera_information_is_that_of_numerical_derivatives() -> None:

@@ -204,10 +204,10 @@ def coverage_figure(coverage: Coverage) -> Figure:
         axis = figure.add_subplot(1, 2, i + 1)
         axis.axvspan(*window, color="0.9", linewidth=0)
         axis.axvline(ideal, color="0.4", linewidth=0.8)
-        values = [table[kind.value][key] for kind in kinds]
-        errors = [2 * table[kind.value][f"{key}_standard_error"] for kind in kinds]
+        values = [table[kind.name][key] for kind in kinds]
+        errors = [2 * table[kind.name][f"{key}_standard_error"] for kind in kinds]
         axis.errorbar(values, places, xerr=errors, fmt="o", markersize=4.5, color="#0072B2", capsize=2)
-        axis.set_yticks(places, [kind.value.replace("_", " ") for kind in kinds] if i == 0 else [])
+        axis.set_yticks(places, [kind.name.replace("_", " ") for kind in kinds] if i == 0 else [])
         axis.set_ylim(-0.6, len(kinds) - 0.4)
         axis.set_xlabel(label)
         axis.grid(visible=True, axis="x", alpha=0.25, linewidth=0.6)

@@ -6,15 +6,16 @@ what an ordinary calibration leaves.
 """
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import cache
 
 import numpy as np
 
 from handeye import _core
 from handeye.errors import SolveError
-from handeye.evaluation.arm import Arm
 from handeye.evaluation.metrics import inverses
+from handeye.robots import Arm, open_arm
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Target, Truth, View
 from handeye.types.arrays import FloatArray
 
@@ -33,7 +34,7 @@ class ErrorKind(StrEnum):
     JOINT_OFFSETS = "joint_offsets"
     """Joint angles off by constants; of joints 2 to 5, as the others only say where base and flange are."""
     SMOOTH_KINEMATIC = "smooth_kinematic"
-    """Lengths and twists of the links off by constants: an error that changes smoothly with the posture."""
+    """Each joint placed wrongly on the link before it: an error that changes smoothly with the posture."""
     WRONG_INTRINSICS = "wrong_intrinsics"
     """The robot is exact; the camera's parameters are off by more than their covariance says."""
 
@@ -81,9 +82,10 @@ LENS = "brown_conrady_5"
 PARAMETERS = np.array([1400.0, 1400.0, 640.0, 512.0, -0.1, 0.05, 0.0005, -0.0005, 0.0])
 SIZE_PX = (1280, 1024)
 MARGIN_PX = 20.0
+ARM = "ur5e"
 # Elbow up, tool down, in front of the robot.
 POSTURE_RAD = np.deg2rad([0.0, -110.0, 110.0, -90.0, -90.0, 0.0])
-MOST_ATTEMPTS = 2000
+MOST_ATTEMPTS = 50
 
 
 def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *, seed: int = 0) -> Recording:
@@ -97,7 +99,7 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
     options = options or CellOptions()
     kind = ErrorKind(kind)
     random = np.random.default_rng([seed, zlib.crc32(kind.encode()), number])
-    arm = Arm()
+    arm = simulated_arm()
     pixel_sigma = _level(random, options.pixel_sigma_px)
     calibrated = Camera(LENS, PARAMETERS, *SIZE_PX)
     covariance = _calibration_covariance(random, calibrated, pixel_sigma, options)
@@ -108,13 +110,13 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
     X, Y = _mount(random, options.mounting)
     count = int(random.integers(options.views[0], options.views[1] + 1))
     joints, camera_poses = _views(random, arm, true_camera, X, Y, count, options)
-    reported = _reported(random, kind, arm, joints, options)
+    reported, read = _reported(random, kind, arm, joints, options)
     views: list[View] = []
     ids = np.arange(TARGET.point_count)
     for k, (pose, T_camera_target) in enumerate(zip(reported, camera_poses, strict=True)):
         pixels, _ = true_camera.project(_in_camera(T_camera_target))
         pixels = pixels + pixel_sigma * random.standard_normal(pixels.shape)
-        views.append(View(f"view_{k + 1:02d}", Pose(pose), ids, pixels, joints_rad=joints[k].tolist()))
+        views.append(View(f"view_{k + 1:02d}", Pose(pose), ids, pixels, joints_rad=read[k].tolist()))
     return Recording(
         f"simulated {kind.value} {number}",
         options.mounting,
@@ -124,6 +126,12 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
         Truth(X, Y),
         "simulated",
     )
+
+
+@cache
+def simulated_arm() -> Arm:
+    """Return the arm of the cells."""
+    return open_arm(ARM)
 
 
 def _level(random: np.random.Generator, bounds: tuple[float, float]) -> float:
@@ -195,19 +203,16 @@ def _views(
     joints: list[FloatArray] = []
     poses: list[FloatArray] = []
     for _ in range(MOST_ATTEMPTS):
-        pose = _camera_pose(random, camera, options)
-        if pose is None:
-            continue
-        chain = X.inverse().matrix @ pose @ Y.inverse().matrix
+        drawn = [_camera_pose(random, camera, options) for _ in range(4 * count)]
+        seen = np.array([pose for pose in drawn if pose is not None]).reshape(-1, 4, 4)
+        chain = X.inverse().matrix @ seen @ Y.inverse().matrix
         flange = inverses(chain) if options.mounting is Mounting.EYE_IN_HAND else chain
-        try:
-            found = arm.inverse(flange, _posture(arm, flange))
-        except SolveError:
-            continue
-        joints.append(found)
-        poses.append(pose)
-        if len(joints) == count:
-            return np.array(joints), np.array(poses)
+        found, reached = arm.inverse_all(flange, _postures(arm, flange), attempts=1)
+        indices = [int(i) for i in np.flatnonzero(reached)]
+        joints += [found[i] for i in indices]
+        poses += [seen[i] for i in indices]
+        if len(joints) >= count:
+            return np.array(joints[:count]), np.array(poses[:count])
     raise SolveError(
         f"{len(joints)} of {count} views found in {MOST_ATTEMPTS} attempts",
         code="no_views",
@@ -215,13 +220,14 @@ def _views(
     )
 
 
-def _posture(arm: Arm, T_base_flange: FloatArray) -> FloatArray:
-    """Return a posture (6,) that is near a pose: the arm turned towards it, the last joint turned with it."""
-    posture = POSTURE_RAD.copy()
-    posture[0] = np.arctan2(-T_base_flange[1, 3], -T_base_flange[0, 3])  # at zero the links extend along -x
-    turn = arm.forward(posture)[:3, :3].T @ T_base_flange[:3, :3]
-    posture[5] = np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
-    return posture
+def _postures(arm: Arm, flange: FloatArray) -> FloatArray:
+    """Return postures (N, 6) near poses (N, 4, 4): the arm turned towards each, the last joint with it."""
+    postures = np.tile(POSTURE_RAD, (len(flange), 1))
+    x, y = arm.forward(POSTURE_RAD)[:2, 3]
+    postures[:, 0] += np.arctan2(flange[:, 1, 3], flange[:, 0, 3]) - np.arctan2(y, x)
+    turn = np.swapaxes(arm.forward(postures)[:, :3, :3], 1, 2) @ flange[:, :3, :3]
+    postures[:, 5] += np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1])
+    return np.arctan2(np.sin(postures), np.cos(postures))
 
 
 def _calibration_covariance(
@@ -260,27 +266,29 @@ def symmetric(matrix: FloatArray) -> FloatArray:
 
 def _reported(
     random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray, options: CellOptions
-) -> FloatArray:
-    """`T_base_flange` (K, 4, 4) as the robot reports it, where it truly stood at `joints` (K, 6)."""
+) -> tuple[FloatArray, FloatArray]:
+    """`T_base_flange` (K, 4, 4) and joints (K, 6) as the robot reports them; it truly stands at `joints`."""
     true = arm.forward(joints)
     if kind in {ErrorKind.WHITE_FLANGE, ErrorKind.WHITE_BASE}:
         metres = _level(random, options.translation_sigma_m)
         degrees = _level(random, options.rotation_sigma_deg)
         errors = _core.se3_exp(np.array([_twist(random, metres, degrees) for _ in joints]))
-        return true @ errors if kind is ErrorKind.WHITE_FLANGE else errors @ true
+        return true @ errors if kind is ErrorKind.WHITE_FLANGE else errors @ true, joints
     if kind is ErrorKind.ENCODER:
         sigma = np.deg2rad(_level(random, options.encoder_sigma_deg))
-        return arm.forward(joints + sigma * random.standard_normal(joints.shape))
+        read = joints + sigma * random.standard_normal(joints.shape)
+        return arm.forward(read), read
     if kind is ErrorKind.JOINT_OFFSETS:
         offsets = np.deg2rad(_level(random, options.offset_sigma_deg)) * random.standard_normal(6)
         offsets[[0, 5]] = 0.0
-        return arm.forward(joints + offsets)
+        return arm.forward(joints + offsets), joints + offsets
     if kind is ErrorKind.SMOOTH_KINEMATIC:
-        wrong = arm.parameters.copy()
-        wrong[:, :2] += _level(random, options.length_sigma_m) * random.standard_normal((6, 2))
-        twist = np.deg2rad(_level(random, options.twist_sigma_deg))
-        wrong[:, 2] += twist * random.standard_normal(6)
-        # Where base and flange are is a matter of names: the last link ends in the flange.
-        wrong[0, 1], wrong[5] = arm.parameters[0, 1], arm.parameters[5]
-        return Arm(wrong).forward(joints)
-    return true
+        metres = _level(random, options.length_sigma_m)
+        degrees = _level(random, options.twist_sigma_deg)
+        # Where base and flange are is a matter of names: the first joint and the last link stay as they are.
+        wrong = [arm.joints[0]] + [
+            replace(joint, placement=joint.placement @ Pose.exp(_twist(random, metres, degrees)))
+            for joint in arm.joints[1:]
+        ]
+        return replace(arm, joints=tuple(wrong)).forward(joints), joints
+    return true, joints

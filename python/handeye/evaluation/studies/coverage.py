@@ -9,11 +9,42 @@ import numpy as np
 from handeye.evaluation import metrics
 from handeye.evaluation.parallel import Progress, run_all
 from handeye.evaluation.protocol import true_hand_eye
-from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
+from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate, simulated_arm
+from handeye.robots import ArmKinematics
 from handeye.solving import Measurements, make_estimator
 from handeye.types.calibration import MM_PER_M, ModelName
 
 RUNS_PER_PIECE = 10
+
+
+@dataclass(frozen=True)
+class Case:
+    """A kind of error, and whether the arm's kinematics are known to the estimate.
+
+    Parameters
+    ----------
+    modelled
+        Whether the default model has a hypothesis of just this kind; without, it can only be careful.
+    """
+
+    name: str
+    kind: ErrorKind
+    arm_known: bool = False
+    modelled: bool = True
+
+
+CASES = (
+    Case("pixel_only", ErrorKind.PIXEL_ONLY),
+    Case("white_flange", ErrorKind.WHITE_FLANGE),
+    Case("white_base", ErrorKind.WHITE_BASE),
+    Case("encoder", ErrorKind.ENCODER, arm_known=True),
+    Case("joint_offsets", ErrorKind.JOINT_OFFSETS, arm_known=True),
+    Case("smooth_kinematic", ErrorKind.SMOOTH_KINEMATIC, modelled=False),
+    Case("wrong_intrinsics", ErrorKind.WRONG_INTRINSICS, modelled=False),
+    Case("encoder_arm_unknown", ErrorKind.ENCODER, modelled=False),
+    Case("joint_offsets_arm_unknown", ErrorKind.JOINT_OFFSETS, modelled=False),
+    Case("smooth_kinematic_arm_known", ErrorKind.SMOOTH_KINEMATIC, arm_known=True, modelled=False),
+)
 
 
 @dataclass(frozen=True)
@@ -34,7 +65,7 @@ class Coverage:
     model: ModelName
     seed: int
     cell: CellOptions
-    kinds: dict[ErrorKind, tuple[Run, ...]] = field(default_factory=dict[ErrorKind, tuple[Run, ...]])
+    kinds: dict[Case, tuple[Run, ...]] = field(default_factory=dict[Case, tuple[Run, ...]])
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON, units in the keys."""
@@ -44,11 +75,11 @@ class Coverage:
             "mounting": self.cell.mounting.value,
             "seed": self.seed,
             "views": list(self.cell.views),
-            "kinds": {kind.value: _kind(runs) for kind, runs in self.kinds.items()},
+            "kinds": {case.name: _kind(case, runs) for case, runs in self.kinds.items()},
         }
 
 
-def _kind(runs: Sequence[Run]) -> dict[str, Any]:
+def _kind(case: Case, runs: Sequence[Run]) -> dict[str, Any]:
     nees = np.array([run.nees for run in runs]) / 6
     share = float(np.mean([run.holds for run in runs]))
     return {
@@ -60,13 +91,15 @@ def _kind(runs: Sequence[Run]) -> dict[str, Any]:
         "translation_mm": float(np.mean([run.translation_mm for run in runs])),
         "rotation_deg": float(np.mean([run.rotation_deg for run in runs])),
         "sigma_translation_mm": float(np.mean([run.sigma_translation_mm for run in runs])),
+        "arm_known": case.arm_known,
+        "modelled": case.modelled,
         "trials": len(runs),
     }
 
 
 def study_coverage(
     *,
-    kinds: Sequence[ErrorKind] = tuple(ErrorKind),
+    cases: Sequence[Case] = CASES,
     model: ModelName = ModelName.AUTO,
     cell: CellOptions | None = None,
     trials: int = 500,
@@ -86,21 +119,21 @@ def study_coverage(
     """
     cell = cell or CellOptions()
     jobs = [
-        _Job(kind, ModelName(model), cell, seed, tuple(range(i, min(i + RUNS_PER_PIECE, trials))))
-        for kind in kinds
+        _Job(case, ModelName(model), cell, seed, tuple(range(i, min(i + RUNS_PER_PIECE, trials))))
+        for case in cases
         for i in range(0, trials, RUNS_PER_PIECE)
     ]
     done = run_all(_run, jobs, workers=workers, progress=progress)
     results = {
-        kind: tuple(run for job, runs in zip(jobs, done, strict=True) if job.kind is kind for run in runs)
-        for kind in kinds
+        case: tuple(run for job, runs in zip(jobs, done, strict=True) if job.case is case for run in runs)
+        for case in cases
     }
     return Coverage(ModelName(model), seed, cell, results)
 
 
 @dataclass(frozen=True)
 class _Job:
-    kind: ErrorKind
+    case: Case
     model: ModelName
     cell: CellOptions
     seed: int
@@ -112,9 +145,9 @@ def _run(job: _Job) -> list[Run]:
 
 
 def _one(job: _Job, number: int) -> Run:
-    recording = simulate(job.kind, number, job.cell, seed=job.seed)
-    measurements = Measurements.of_recording(recording)
-    estimate = make_estimator(job.model)(measurements)
+    recording = simulate(job.case.kind, number, job.cell, seed=job.seed)
+    kinematics = ArmKinematics(simulated_arm()) if job.case.arm_known else None
+    estimate = make_estimator(job.model, kinematics)(Measurements.of_recording(recording))
     X_true = true_hand_eye(recording)
     covariance = estimate.hand_eye_covariance
     squared = metrics.nees(estimate.X, covariance, X_true)
