@@ -61,6 +61,14 @@ def test_wrong_pattern_is_an_error_of_detection(tmp_path: Path) -> None:
     assert "none of 3 images" in caught.value.message
 
 
+def test_wrong_pattern_is_refused_before_all_images_are_searched(pictures: tuple[Path, Pose]) -> None:
+    steps: list[int] = []
+    with pytest.raises(DetectionError) as caught:
+        open_folder(pictures[0], SourceOptions(pattern=(6, 8)), progress=lambda done, _: steps.append(done))
+    assert "the first 4 of 8 images show a target of another size" in caught.value.message
+    assert (caught.value.code, max(steps)) == ("not_detected", 4)
+
+
 def test_damaged_picture_is_no_missed_view(tmp_path: Path) -> None:
     folder, _ = photographed(tmp_path / "set", 4)
     whole = (folder / "im_03.png").read_bytes()

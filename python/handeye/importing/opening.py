@@ -9,9 +9,13 @@ from pathlib import Path
 
 from handeye.datasets import DataWarning, ImageSet, LoadedRecording, Shot, load, recording_warnings
 from handeye.datasets.images import read_image
-from handeye.detection import Detection, Image, calibrate_camera, detect_all
-from handeye.errors import HandeyeError, InputError
+from handeye.detection import Detection, Image, Reason, calibrate_camera, detect_all
+from handeye.errors import DetectionError, HandeyeError, InputError
 from handeye.types import Camera, Mounting, Recording, Target
+
+# So many images from the first on, all with a board of another size: the size was given wrongly, and looking
+# at the rest, which is slow where nothing is found, would only say so again.
+ENOUGH_OF_WRONG_SIZE = 4
 
 
 class CameraOrigin(StrEnum):
@@ -156,9 +160,9 @@ def _detect(
     InputError
         An image is missing or damaged: that is an accident, not a view without the target.
     DetectionError
-        The target is in no image.
+        The target is in no image, or the first ones show one of another size.
     """
-    total, done = len(images.shots), 0
+    total, done, wrong = len(images.shots), 0, 0
     size = images.image_size_px or (0, 0)
 
     def read(shot: Shot) -> Image:
@@ -168,12 +172,20 @@ def _detect(
         return image
 
     def count(name: str, outcome: Detection | HandeyeError) -> None:
-        nonlocal done
+        nonlocal done, wrong
         if isinstance(outcome, InputError):
             where = f"image of view {name}"
             raise InputError(f"{where}: {outcome.message}", code=outcome.code, hint=outcome.hint) from outcome
         done += 1
         progress(done, total)
+        if isinstance(outcome, DetectionError) and outcome.code == Reason.WRONG_SIZE:
+            wrong += 1
+            if wrong == done == ENOUGH_OF_WRONG_SIZE:
+                raise DetectionError(
+                    f"the first {done} of {total} images show a target of another size; {outcome.message}",
+                    code="not_detected",
+                    hint=outcome.hint,
+                ) from outcome
 
     progress(done, total)
     readers = [(shot.name, partial(read, shot)) for shot in images.shots]
