@@ -74,11 +74,11 @@ def with_finals(shown: Demonstration, finals: dict[str, float]) -> Demonstration
 def test_sentence_says_who_is_best(shown: Demonstration) -> None:
     sentence = with_finals(shown, {"next_best_view": 0.1, "random": 0.32, "max_distance": 0.2}).sentence
     assert sentence == (
-        "After 3 + 5 views, views chosen for their gain leave the camera 0.10 mm off on average, the most distant "
-        "views 0.20 mm and random views 0.32 mm; 3 of the former are worth 5 random ones."
+        "After 3 + 5 views, views chosen for their gain leave the camera 0.1 mm off on average, the most distant "
+        "views 0.2 mm and random views 0.32 mm; 3 of the former are worth 5 random ones."
     )
     lost = with_finals(shown, {"next_best_view": 0.3, "random": 0.1, "max_distance": 0.2}).sentence
-    assert lost.startswith("After 3 + 5 views, random views leave the camera 0.10 mm off on average")
+    assert lost.startswith("After 3 + 5 views, random views leave the camera 0.1 mm off on average")
     assert "worth" not in lost
 
 

@@ -86,9 +86,9 @@ class Demonstration:
         """What it shows, in one sentence that the numbers decide."""
         final = {policy: self._mean(Way(policy))[-1] for policy in POLICIES}
         best, *rest = sorted(POLICIES, key=lambda policy: final[policy])
-        others = " and ".join(f"{_WORDS[policy]} {final[policy]:.2f} mm" for policy in rest)
+        others = " and ".join(f"{_WORDS[policy]} {final[policy]:.2g} mm" for policy in rest)
         taken = f"After {self.protocol.start_views} + {self.protocol.added_views} views"
-        text = f"{taken}, {_WORDS[best]} leave the camera {final[best]:.2f} mm off on average, {others}"
+        text = f"{taken}, {_WORDS[best]} leave the camera {final[best]:.2g} mm off on average, {others}"
         chosen, chance = self._mean(Way(best)), final["random"]
         enough = int(np.argmax(chosen <= chance))
         if best != "random" and enough < self.protocol.added_views:

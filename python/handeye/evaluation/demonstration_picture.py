@@ -36,8 +36,8 @@ _LOOKS = {
 }
 # Policies whose single starts are drawn too: all of them would hide each other.
 _SINGLY = (Way("next_best_view"), Way("random"))
-_TICKS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50]
-_FEW_TICKS = [0.01, 0.1, 1, 10, 100]
+_TICKS = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50]
+_FEW_TICKS = [0.001, 0.01, 0.1, 1, 10, 100]
 _INK = "#222222"
 
 
@@ -67,7 +67,7 @@ def _errors(axis: Axes, shown: Demonstration) -> None:
     _plain_ticks(axis.yaxis, _TICKS)
     for (value, look), height in zip(ends, _spread([value for value, _ in ends]), strict=True):
         axis.annotate(
-            f"{value:.2f}  {look.label}",
+            f"{value:.2g}  {look.label}",
             (views[-1], value),
             xytext=(views[-1] + 0.22, height),
             color=look.colour,
