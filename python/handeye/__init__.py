@@ -1,1 +1,1 @@
-"""Hand-eye calibration that says which view to take next, when to stop, and how far its answer can be trusted."""
+"""Hand-eye calibration: which view to take next, when to stop, and how far its answer can be trusted."""

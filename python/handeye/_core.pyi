@@ -240,8 +240,9 @@ class Criterion:
 class Predictor:
     """Predicts what candidate views would tell, at motions A (N, 4, 4).
 
-    `free_joints`: joints whose offset is a parameter; `joint_noise` (n,): standard deviation of each joint, in place
-    of `robot_root` wherever `jacobians` (N, 6, n) of the candidates are given: truly `exp(jacobians[i] dq) @ A`.
+    `free_joints`: joints whose offset is a parameter; `joint_noise` (n,): standard deviation of each joint,
+    in place of `robot_root` wherever `jacobians` (N, 6, n) of the candidates are given: truly
+    `exp(jacobians[i] dq) @ A`.
     """
 
     def __init__(
@@ -292,13 +293,14 @@ def start_from_poses(
     start: tuple[ArrayLike, ArrayLike] | None = None,
     prior_sigma_m: float = 1.0,
 ) -> tuple[NDArray[float64], NDArray[float64], float, str]:
-    """X, Y, cost and origin that fit `poses[k] ~ X motions[k] Y` (K, 4, 4) from many starts, with a weak prior."""
+    """X, Y, cost and origin that fit `poses[k] ~ X motions[k] Y` (K, 4, 4), from many starts and a prior."""
 
 class JointErrors:
     """How errors of the joints of an arm move the motions: truly `exp(jacobians[k] dq) @ motions[k]`.
 
-    `jacobians` (K, 6, n), one per view of the problem. `scales` (n,): what a level of one radian means for each joint,
-    1 for one that turns, metres for one that slides. `free`: joints whose offset is a parameter. Levels of the noise
+    `jacobians` (K, 6, n), one per view of the problem. `scales` (n,): what a level of one radian means for
+    each joint, 1 for one that turns, metres for one that slides. `free`: joints whose offset is a parameter.
+    Levels of the noise
     and of the offsets are found unless given.
     """
 
@@ -347,8 +349,8 @@ class Compressed:
     ) -> Posterior:
         """The answer from these views, averaged over a grid of robot noise levels and sides.
 
-        `levels` (metres, radians) gives them instead; then `sides` are all that is compared. With `joints` noise of
-        the joints is a further hypothesis, and their offsets are further parameters.
+        `levels` (metres, radians) gives them instead; then `sides` are all that is compared. With `joints`
+        noise of         the joints is a further hypothesis, and their offsets are further parameters.
         """
 
 class Posterior:
@@ -383,8 +385,9 @@ class Posterior:
 class Chain:
     """A serial arm of n joints, at most 16, base first.
 
-    Joint i has the pose `placements[i]` (4, 4) in the frame of the joint before it at position zero, turns about or
-    slides along `axes[i]` (3,), and moves from `limits[i][0]` to `limits[i][1]` (radians or metres, may be infinite).
+    Joint i has the pose `placements[i]` (4, 4) in the frame of the joint before it at position zero, turns
+    about or slides along `axes[i]` (3,), and moves from `limits[i][0]` to `limits[i][1]` (radians or metres,
+    may be infinite).
     `tip` (4, 4) is the flange in the frame of the last joint. Raises `InputError` for what is no chain.
     """
 
@@ -397,7 +400,10 @@ class Chain:
         """`T_base_flange` (N, 4, 4) at joints (N, n)."""
 
     def jacobians(self, joints: ArrayLike, frame: str) -> NDArray[float64]:
-        """Twists (N, 6, n) per joint: `T(q + dq) = exp(J dq) T(q)` for "base", `T(q) exp(J dq)` for "flange"."""
+        """Twists (N, 6, n) per joint.
+
+        `T(q + dq) = exp(J dq) T(q)` for "base", `T(q) exp(J dq)` for "flange".
+        """
 
     def inverse(
         self,
@@ -435,7 +441,7 @@ def select_views(
     *,
     tool_points: ArrayLike | None = None,
 ) -> tuple[list[int], float]:
-    """Choose k of a pool (N, n, n) on top of `base` (n, n), greedily and by exchange; indices and their worth.
+    """Choose k of a pool (N, n, n) on top of `base` (n, n): indices and their worth.
 
     `objective`: entropy, entropy_handeye, or tool_point with points (P, 3) in the camera frame. Worth is
     `ln |Lambda|`, `ln |Lambda| - ln |Lambda_nn|`, or minus the mean variance in square metres.
