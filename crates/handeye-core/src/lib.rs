@@ -9,6 +9,7 @@ pub mod error;
 pub mod evidence;
 pub mod information;
 pub mod kinematics;
+mod lanes;
 pub mod least_squares;
 pub mod planar_pose;
 pub mod planning;

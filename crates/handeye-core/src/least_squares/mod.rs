@@ -5,11 +5,14 @@
 //! per view that is marginalised exactly. Twists perturb on the left: `X <- exp(xi_x) X`.
 
 mod accumulate;
+mod engine;
+mod general;
 mod loss;
 mod marginal;
 mod model;
 mod problem;
 mod report;
+mod side_by_side;
 mod solver;
 
 pub(crate) use accumulate::Moments;

@@ -96,11 +96,26 @@ pub struct ChainPrior {
 
 impl ChainPrior {
     /// Deviation, its Jacobian in the perturbation, and the information of `X` (`of_x`) or `Y`.
-    pub(super) fn term(&self, of_x: bool, value: &Se3) -> (Vector6<f64>, Matrix6<f64>, Vector6<f64>) {
+    fn term(&self, of_x: bool, value: &Se3) -> (Vector6<f64>, Matrix6<f64>, Vector6<f64>) {
         let (mean, sigma) = if of_x { (&self.x, &self.sigma_x) } else { (&self.y, &self.sigma_y) };
         let deviation = (*value * mean.inverse()).log();
         let information = sigma.map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 });
         (deviation, Se3::left_jacobian_inverse(&deviation), information)
+    }
+
+    /// Sum of squared whitened deviations of `X` and `Y`.
+    pub(super) fn cost(&self, x: &Se3, y: &Se3) -> f64 {
+        [(true, x), (false, y)].into_iter().fold(0.0, |sum, (of_x, value)| {
+            let (deviation, _, information) = self.term(of_x, value);
+            sum + deviation.component_mul(&deviation).dot(&information)
+        })
+    }
+
+    /// Information and gradient of the twist of `X` (`of_x`) or `Y`.
+    pub(super) fn normal(&self, of_x: bool, value: &Se3) -> (Matrix6<f64>, Vector6<f64>) {
+        let (deviation, jacobian, information) = self.term(of_x, value);
+        let weighted = jacobian.transpose() * Matrix6::from_diagonal(&information);
+        (weighted * jacobian, weighted * deviation)
     }
 
     fn check(&self) -> Result<(), Error> {

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix2, Vector2};
 
+use super::side_by_side::Measurements;
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
 use crate::se3::Se3;
@@ -21,6 +22,8 @@ pub struct Problem {
     whitening: Option<Vec<Matrix2<f64>>>,
     offsets: Vec<usize>,
     motions: Vec<Se3>,
+    /// All views in order, as lanes want them; none where there are circles.
+    measurements: Option<Measurements>,
 }
 
 impl Problem {
@@ -62,7 +65,15 @@ impl Problem {
             }
         }
         let whitening = covariances.map(|all| whitening(all, pixels.len())).transpose()?;
-        Ok(Self { camera, features, pixels, whitening, offsets, motions })
+        let mut problem = Self { camera, features, pixels, whitening, offsets, motions, measurements: None };
+        let views: Vec<usize> = (0..problem.view_count()).collect();
+        problem.measurements = Measurements::new(&problem, &views);
+        Ok(problem)
+    }
+
+    /// All views in order, as lanes want them; None where there are circles.
+    pub(super) fn measurements(&self) -> Option<&Measurements> {
+        self.measurements.as_ref()
     }
 
     /// The camera the pixels were taken with.

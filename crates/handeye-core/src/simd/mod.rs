@@ -140,7 +140,6 @@ pub(crate) trait Vector:
     fn max(self, other: Self) -> Self;
 
     /// Square roots.
-    #[allow(dead_code, reason = "for kernels to come")]
     fn sqrt(self) -> Self;
 
     /// Whether `self > other`; false where one is not a number.
@@ -159,7 +158,6 @@ pub(crate) trait Vector:
     fn mantissa_and_exponent(self) -> (Self, Self);
 
     /// Sum over the lanes, by halves.
-    #[allow(dead_code, reason = "for kernels to come")]
     fn sum(self) -> f64;
 }
 

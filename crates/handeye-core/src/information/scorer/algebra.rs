@@ -1,7 +1,8 @@
 //! Determinants of six-dimensional measurements, lanes = candidates; everything unrolled.
 
-use super::block::{BLOCK, Block, Row, UPPER, load, upper};
+use super::block::{BLOCK, Block, Row};
 use super::forms::{Form, Moved};
+use crate::lanes::{UPPER, load, upper};
 use crate::simd::{Kernel, Simd, Vector, ln};
 
 /// Pivots of a covariance below this fraction of their diagonal are rounding.

@@ -1,7 +1,8 @@
 //! From robot motions to camera poses: check that they are rigid, then `X A` and `X A Y`.
 
-use super::block::{BLOCK, Block, store};
-use crate::se3::{RIGID_TOLERANCE, Se3};
+use super::block::{BLOCK, Block};
+use crate::lanes::{left_product, right_product, store};
+use crate::se3::RIGID_TOLERANCE;
 use crate::simd::{Kernel, Mask, Simd, Vector};
 
 /// Doubles of a homogeneous 4 x 4 matrix.
@@ -16,18 +17,6 @@ pub(super) struct Approach<'a> {
     pub y: &'a [f64; 12],
     pub motions: &'a [f64],
     pub block: &'a mut Block,
-}
-
-/// Rotation row by row, then translation.
-pub(super) fn entries(t: &Se3) -> [f64; 12] {
-    let mut out = [0.0; 12];
-    for i in 0..3 {
-        for j in 0..3 {
-            out[3 * i + j] = t.rotation[(i, j)];
-        }
-        out[9 + i] = t.translation[i];
-    }
-    out
 }
 
 impl Kernel for Approach<'_> {
@@ -113,34 +102,4 @@ fn newton_schulz<S: Simd>(simd: S, r: &mut [S::Vector; 12]) {
         r[3 * i + 1] = a.mul_add(o01, b.mul_add(d[1], c * o12));
         r[3 * i + 2] = a.mul_add(o02, b.mul_add(o12, c * d[2]));
     }
-}
-
-/// `L A`, `L` the same for all lanes.
-#[inline(always)]
-fn left_product<S: Simd>(simd: S, left: &[f64; 12], a: &[S::Vector; 12]) -> [S::Vector; 12] {
-    let mut out = *a;
-    for i in 0..3 {
-        let (p, q, r) = (simd.splat(left[3 * i]), simd.splat(left[3 * i + 1]), simd.splat(left[3 * i + 2]));
-        for j in 0..3 {
-            out[3 * i + j] = p.mul_add(a[j], q.mul_add(a[3 + j], r * a[6 + j]));
-        }
-        out[9 + i] = p.mul_add(a[9], q.mul_add(a[10], r.mul_add(a[11], simd.splat(left[9 + i]))));
-    }
-    out
-}
-
-/// `A R`, `R` the same for all lanes.
-#[inline(always)]
-fn right_product<S: Simd>(simd: S, a: &[S::Vector; 12], right: &[f64; 12]) -> [S::Vector; 12] {
-    let mut out = *a;
-    for i in 0..3 {
-        let (p, q, r) = (a[3 * i], a[3 * i + 1], a[3 * i + 2]);
-        for j in 0..4 {
-            let (to, from) = if j < 3 { (3 * i + j, [j, 3 + j, 6 + j]) } else { (9 + i, [9, 10, 11]) };
-            let first = r * simd.splat(right[from[2]]);
-            let sum = p.mul_add(simd.splat(right[from[0]]), q.mul_add(simd.splat(right[from[1]]), first));
-            out[to] = if j < 3 { sum } else { sum + a[9 + i] };
-        }
-    }
-    out
 }

@@ -3,10 +3,10 @@
 //! With the lens' Jacobian `J` at unit depth, a row of `d pi / d eta` with entries `(A, B)` of `F J` is
 //! `[A w, B w, -s w, -(y s + B), A + x s, B x - A y]`, `s = x A + y B`.
 
-use super::block::{BLOCK, Block, UPPER, load, store, upper};
-use super::lens::{Window, bend};
+use super::block::{BLOCK, Block};
 use super::target::Target;
 use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
+use crate::lanes::{UPPER, Window, bend, load, store, upper};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// Sums the information, divided by `f_x^2`, of the points in sight, and counts them.

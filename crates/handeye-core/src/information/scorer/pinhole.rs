@@ -1,18 +1,9 @@
 //! The information of corners seen by a pinhole camera, lanes = candidates.
-//!
-//! With `x = p_x / p_z`, `y = p_y / p_z`, `w = 1 / p_z` the rows of `d pi / d eta` are
-//!
-//! ```text
-//! f_x [w, 0, -x w, -x y,       1 + x^2, -y]
-//! f_y [0, w, -y w, -(1 + y^2), x y,      x]
-//! ```
-//!
-//! so that every entry of their square is a sum of few monomials over the points: 23 sums in place of two times 21.
 
-use super::block::{BLOCK, Block, UPPER, load, store, upper};
-use super::lens::Window;
+use super::block::{BLOCK, Block};
 use super::target::Target;
 use crate::camera::MIN_DEPTH_M;
+use crate::lanes::{Sums, Window, load, store};
 use crate::simd::{Kernel, Mask, Simd, Vector};
 
 /// Sums the information, divided by `f_x^2`, of the points in sight, and counts them.
@@ -34,7 +25,8 @@ impl Kernel for Pinhole<'_> {
             } else {
                 sum::<S, true>(simd, self.window, self.target, &pose)
             };
-            store(&arrange(simd, self.window.squared_aspect, &sums, seen), self.block.of_twist(), at);
+            let information = sums.information(simd, self.window.squared_aspect, seen);
+            store(&information, self.block.of_twist(), at);
             seen.store(&mut self.block.seen[at..]);
         }
     }
@@ -76,35 +68,7 @@ fn whole<S: Simd>(simd: S, window: &Window, target: &Target, pose: &[S::Vector; 
     inside.all()
 }
 
-/// The sums over the points.
-#[derive(Clone, Copy)]
-struct Sums<V> {
-    w: V,
-    ww: V,
-    x: V,
-    y: V,
-    xw: V,
-    yw: V,
-    xww: V,
-    yww: V,
-    qww: V,
-    xx: V,
-    yy: V,
-    xy: V,
-    xyw: V,
-    xxw: V,
-    yyw: V,
-    xqw: V,
-    yqw: V,
-    xyq: V,
-    xxxx: V,
-    yyyy: V,
-    xxyy: V,
-    xyy: V,
-    xxy: V,
-}
-
-/// `q` below is `x^2 + aspect^2 y^2`.
+/// The sums over the points in sight, and their number.
 #[inline(always)]
 fn sum<S: Simd, const PARTLY: bool>(
     simd: S,
@@ -112,35 +76,10 @@ fn sum<S: Simd, const PARTLY: bool>(
     target: &Target,
     pose: &[S::Vector; 12],
 ) -> (Sums<S::Vector>, S::Vector) {
-    let zero = simd.splat(0.0);
     let one = simd.splat(1.0);
     let squared_aspect = simd.splat(window.squared_aspect);
-    let mut s = Sums {
-        w: zero,
-        ww: zero,
-        x: zero,
-        y: zero,
-        xw: zero,
-        yw: zero,
-        xww: zero,
-        yww: zero,
-        qww: zero,
-        xx: zero,
-        yy: zero,
-        xy: zero,
-        xyw: zero,
-        xxw: zero,
-        yyw: zero,
-        xqw: zero,
-        yqw: zero,
-        xyq: zero,
-        xxxx: zero,
-        yyyy: zero,
-        xxyy: zero,
-        xyy: zero,
-        xxy: zero,
-    };
-    let mut seen = zero;
+    let mut sums = Sums::new(simd);
+    let mut seen = simd.splat(0.0);
     for line in &target.lines {
         let (line_y, line_z) = (simd.splat(line.y), simd.splat(line.z));
         let start_x = pose[1].mul_add(line_y, pose[2].mul_add(line_z, pose[9]));
@@ -164,68 +103,8 @@ fn sum<S: Simd, const PARTLY: bool>(
                 x = x.keep(in_sight);
                 y = y.keep(in_sight);
             }
-            let (xx, yy, xy, ww) = (x * x, y * y, x * y, w * w);
-            let (xw, yw) = (x * w, y * w);
-            let q = yy.mul_add(squared_aspect, xx);
-            s.w = s.w + w;
-            s.ww = s.ww + ww;
-            s.x = s.x + x;
-            s.y = s.y + y;
-            s.xw = s.xw + xw;
-            s.yw = s.yw + yw;
-            s.xx = s.xx + xx;
-            s.yy = s.yy + yy;
-            s.xy = s.xy + xy;
-            s.xww = xw.mul_add(w, s.xww);
-            s.yww = yw.mul_add(w, s.yww);
-            s.qww = q.mul_add(ww, s.qww);
-            s.xyw = xy.mul_add(w, s.xyw);
-            s.xxw = xx.mul_add(w, s.xxw);
-            s.yyw = yy.mul_add(w, s.yyw);
-            s.xqw = xw.mul_add(q, s.xqw);
-            s.yqw = yw.mul_add(q, s.yqw);
-            s.xyq = xy.mul_add(q, s.xyq);
-            s.xxxx = xx.mul_add(xx, s.xxxx);
-            s.yyyy = yy.mul_add(yy, s.yyyy);
-            s.xxyy = xx.mul_add(yy, s.xxyy);
-            s.xyy = xy.mul_add(y, s.xyy);
-            s.xxy = xy.mul_add(x, s.xxy);
+            sums.add(squared_aspect, w, x, y);
         }
     }
-    (s, seen)
-}
-
-/// The information from the sums, divided by `f_x^2`.
-#[inline(always)]
-fn arrange<S: Simd>(
-    simd: S,
-    squared_aspect: f64,
-    s: &Sums<S::Vector>,
-    seen: S::Vector,
-) -> [S::Vector; UPPER] {
-    let a = simd.splat(squared_aspect);
-    let rest = simd.splat(1.0 - squared_aspect);
-    let two = simd.splat(2.0);
-    let mut m = [simd.splat(0.0); UPPER];
-    m[upper(0, 0)] = s.ww;
-    m[upper(0, 2)] = -s.xww;
-    m[upper(0, 3)] = -s.xyw;
-    m[upper(0, 4)] = s.w + s.xxw;
-    m[upper(0, 5)] = -s.yw;
-    m[upper(1, 1)] = a * s.ww;
-    m[upper(1, 2)] = -(a * s.yww);
-    m[upper(1, 3)] = -(a * (s.w + s.yyw));
-    m[upper(1, 4)] = a * s.xyw;
-    m[upper(1, 5)] = a * s.xw;
-    m[upper(2, 2)] = s.qww;
-    m[upper(2, 3)] = a.mul_add(s.yw, s.yqw);
-    m[upper(2, 4)] = -(s.xw + s.xqw);
-    m[upper(2, 5)] = rest * s.xyw;
-    m[upper(3, 3)] = a.mul_add(two.mul_add(s.yy, seen + s.yyyy), s.xxyy);
-    m[upper(3, 4)] = -(s.xyq + simd.splat(1.0 + squared_aspect) * s.xy);
-    m[upper(3, 5)] = rest * s.xyy - a * s.x;
-    m[upper(4, 4)] = a.mul_add(s.xxyy, two.mul_add(s.xx, seen + s.xxxx));
-    m[upper(4, 5)] = -rest.mul_add(s.xxy, s.y);
-    m[upper(5, 5)] = a.mul_add(s.xx, s.yy);
-    m
+    (sums, seen)
 }

@@ -5,8 +5,9 @@
 //! all of them is `(N^-1 + S)^-1`.
 
 use super::algebra::{NULL_PIVOT, add_square, spread};
-use super::block::{BLOCK, Block, Row, UPPER, load, upper};
+use super::block::{BLOCK, Block, Row};
 use super::forms::{Form, Moved, Observed, packed};
+use crate::lanes::{UPPER, load, upper};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// What is wanted of a block.

@@ -1,10 +1,10 @@
 //! The information of corners in twist and pixel parameters, lanes = candidates.
 
-use super::block::{BLOCK, Block, load};
+use super::block::{BLOCK, Block};
 use super::forms::packed;
-use super::lens::{Bent, Window, bend};
 use super::target::Target;
 use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
+use crate::lanes::{Bent, Window, bend, load};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// Rows of `d pi / d [eta; c]` that are squared together: so many sums stay in registers.

@@ -1,11 +1,11 @@
-//! Lenses and what of the image counts, in the plane at unit depth, lanes = candidates.
+//! Lenses and what of the image counts, in the plane at unit depth.
 
 use crate::camera::MAX_PARAMETERS;
 use crate::simd::{Simd, Vector};
 
 /// The part of the plane, after the lens, whose points count as seen.
 #[derive(Clone, Copy)]
-pub(super) struct Window {
+pub(crate) struct Window {
     /// Squared ratio of the focal lengths, `(f_y / f_x)^2`.
     pub squared_aspect: f64,
     /// Lowest and highest x and y.
@@ -16,7 +16,7 @@ pub(super) struct Window {
 }
 
 /// A point after the lens and the derivatives `[along_x, cross_x; cross_y, along_y]`.
-pub(super) struct Bent<V> {
+pub(crate) struct Bent<V> {
     pub x: V,
     pub y: V,
     pub along_x: V,
@@ -48,12 +48,17 @@ impl<V: Vector> Bent<V> {
         }
     }
 
-    /// Whether a point in front of the camera is in the window and where the lens is one-to-one.
+    /// Whether a point in front of the camera is where the lens is one-to-one.
+    #[inline(always)]
+    pub fn is_valid<S: Simd<Vector = V>>(&self, simd: S, max_squared_radius: f64) -> V::Mask {
+        let determinant = self.cross_y.neg_mul_add(self.cross_x, self.along_x * self.along_y);
+        simd.splat(max_squared_radius).at_least(self.squared_radius) & determinant.greater(simd.splat(0.0))
+    }
+
+    /// Whether it is in the window as well.
     #[inline(always)]
     pub fn in_sight<S: Simd<Vector = V>>(&self, simd: S, window: &Window) -> V::Mask {
-        let determinant = self.cross_y.neg_mul_add(self.cross_x, self.along_x * self.along_y);
-        simd.splat(window.max_squared_radius).at_least(self.squared_radius)
-            & determinant.greater(simd.splat(0.0))
+        self.is_valid(simd, window.max_squared_radius)
             & self.x.at_least(simd.splat(window.x[0]))
             & simd.splat(window.x[1]).at_least(self.x)
             & self.y.at_least(simd.splat(window.y[0]))
@@ -63,7 +68,7 @@ impl<V: Vector> Bent<V> {
 
 /// As `camera::brown_conrady::bend`.
 #[inline(always)]
-pub(super) fn bend<S: Simd, const RATIONAL: bool, const PRISM: bool>(
+pub(crate) fn bend<S: Simd, const RATIONAL: bool, const PRISM: bool>(
     simd: S,
     p: &[f64; MAX_PARAMETERS],
     x: S::Vector,

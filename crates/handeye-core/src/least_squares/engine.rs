@@ -1,0 +1,53 @@
+//! What an iteration asks of whatever linearises the views.
+
+use nalgebra::DMatrix;
+
+use super::report::{Ending, Solution};
+
+/// Smallest pivot of the equilibrated information that counts as determined. A pivot is one minus the squared
+/// multiple correlation of a parameter with those before it; rounding alone leaves about 1e-15.
+const PIVOT_LIMIT: f64 = 1e-13;
+
+/// A step that the normal equations propose.
+pub(super) struct Proposal {
+    /// Decrease of the (doubled) quadratic model.
+    pub predicted: f64,
+    /// Largest move of a parameter.
+    pub largest: f64,
+}
+
+/// A linearised problem at a state, with another state to try.
+pub(super) trait Engine {
+    /// Cost at the state.
+    fn cost(&self) -> f64;
+
+    /// The step of the normal equations with a damping; None if they are not positive definite.
+    fn propose(&mut self, damping: f64) -> Option<Proposal>;
+
+    /// Linearises at the state that the last proposed step leads to; its cost, or None if something is out of sight
+    /// there.
+    fn attempt(&mut self) -> Option<f64>;
+
+    /// Makes the attempted state the state.
+    fn accept(&mut self);
+
+    /// Tells of the state.
+    fn report(&mut self, initial_cost: f64, iterations: usize, ending: Ending) -> Solution;
+}
+
+/// Whether an information leaves a direction open.
+pub(super) fn is_degenerate(information: &DMatrix<f64>) -> bool {
+    smallest_pivot(information) < PIVOT_LIMIT
+}
+
+/// Smallest pivot of the Cholesky factorisation of `h` scaled to a unit diagonal; zero if it does not exist.
+fn smallest_pivot(h: &DMatrix<f64>) -> f64 {
+    let n = h.nrows();
+    let scale: Vec<f64> = (0..n).map(|i| 1.0 / h[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| h[(i, j)] * scale[i] * scale[j]);
+    if scaled.iter().any(|x| !x.is_finite()) {
+        return 0.0;
+    }
+    let Some(factor) = scaled.cholesky() else { return 0.0 };
+    (0..n).map(|i| factor.l_dirty()[(i, i)].powi(2)).fold(f64::INFINITY, f64::min)
+}

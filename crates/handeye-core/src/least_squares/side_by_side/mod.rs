@@ -1,0 +1,302 @@
+//! The engine for `X` and `Y` alone, with or without robot noise: views side by side in vector lanes.
+//!
+//! Nothing is allocated between the first linearisation and the report.
+
+#![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
+#![expect(clippy::needless_range_loop, reason = "indices of matrices: several are read at the same place")]
+
+mod look;
+mod measurements;
+mod normal;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
+
+use self::look::{Look, Optics, Sight};
+pub(super) use self::measurements::Measurements;
+use self::measurements::Row;
+use self::normal::{Correct, Errors, Matrix12, Noise, Normal, Vector12, correction, lane, set_lane};
+use super::engine::{Engine, Proposal, is_degenerate};
+use super::loss::Loss;
+use super::model::{Model, Side};
+use super::problem::Problem;
+use super::report::{Ending, Solution, ViewReport};
+use super::solver::{Options, Start};
+use crate::camera::Lens;
+use crate::lanes::entries;
+use crate::se3::Se3;
+use crate::simd::{MAX_LANES, VectorUnit, dispatch};
+
+/// What changes from step to step.
+struct State {
+    x: Se3,
+    y: Se3,
+    /// Motions of each group with the robot's errors.
+    motions: Vec<[Row; 12]>,
+    /// One per group, or none for an exact robot.
+    errors: Vec<Errors>,
+    sights: Vec<Sight>,
+    cost: f64,
+}
+
+pub(super) struct SideBySide<'a> {
+    problem: &'a Problem,
+    model: &'a Model,
+    loss: Loss,
+    views: &'a [usize],
+    unit: VectorUnit,
+    measurements: &'a Measurements,
+    optics: Optics,
+    /// `1 / sigma^2` of the pixels of each group.
+    information: Vec<Row>,
+    /// As the robot reports them.
+    motions: Vec<[Row; 12]>,
+    current: State,
+    trial: State,
+    h: Matrix12,
+    g: Vector12,
+    step: Vector12,
+}
+
+/// Whether the engine can do it: corners, a lens of the kind that lanes know, and nothing free but `X` and `Y`.
+pub(super) fn fits(problem: &Problem, model: &Model) -> bool {
+    problem.camera().lens != Lens::KannalaBrandt && model.parameter_count() == 12
+}
+
+impl<'a> SideBySide<'a> {
+    /// At the start; the index of the first view that cannot be seen from there otherwise.
+    pub fn new(
+        problem: &'a Problem,
+        model: &'a Model,
+        options: &Options,
+        views: &'a [usize],
+        measurements: &'a Measurements,
+        start: &Start,
+        unit: VectorUnit,
+    ) -> Result<Self, usize> {
+        const ZERO: Row = [0.0; MAX_LANES];
+        let groups = measurements.groups.len();
+        let mut information = vec![ZERO; groups];
+        let mut motions = vec![[ZERO; 12]; groups];
+        for i in 0..groups * MAX_LANES {
+            // Lanes without a view repeat the first of their group.
+            let (group, at) = (i / MAX_LANES, i % MAX_LANES);
+            let k = *views.get(i).unwrap_or(&views[group * MAX_LANES]);
+            information[group][at] = model.pixel_sigma[k].powi(-2);
+            set_lane(&mut motions[group], at, &entries(problem.motion(k)));
+        }
+        let noisy = if model.robot.is_some() { groups } else { 0 };
+        let state = || State {
+            x: start.x,
+            y: start.y,
+            motions: motions.clone(),
+            errors: vec![Errors::new(); noisy],
+            sights: vec![Sight::new(); groups],
+            cost: 0.0,
+        };
+        let camera = problem.camera();
+        let mut engine = Self {
+            problem,
+            model,
+            loss: options.loss,
+            views,
+            unit,
+            measurements,
+            optics: Optics { parameters: camera.parameters, max_squared_radius: camera.max_squared_radius() },
+            information,
+            current: state(),
+            trial: state(),
+            motions,
+            h: Matrix12::zeros(),
+            g: Vector12::zeros(),
+            step: Vector12::zeros(),
+        };
+        engine.look()?;
+        std::mem::swap(&mut engine.current, &mut engine.trial);
+        Ok(engine)
+    }
+
+    /// Linearises every view at the trial state; the index of the first that cannot be seen otherwise.
+    fn look(&mut self) -> Result<(), usize> {
+        self.err();
+        let trial = &mut self.trial;
+        let (x, y) = (entries(&trial.x), entries(&trial.y));
+        let alike = self.loss == Loss::Squared && self.problem.whitening(0).is_none();
+        macro_rules! look {
+            ($($flag:literal),*) => {
+                dispatch(self.unit, Look::<$($flag),*> {
+                    x: &x,
+                    y: &y,
+                    motions: &trial.motions,
+                    information: &self.information,
+                    optics: &self.optics,
+                    loss: self.loss,
+                    measurements: self.measurements,
+                    out: &mut trial.sights,
+                })
+            };
+        }
+        match (self.problem.camera().lens, alike) {
+            (Lens::Pinhole | Lens::KannalaBrandt, true) => look!(false, false, true),
+            (Lens::Pinhole | Lens::KannalaBrandt, false) => look!(false, false, false),
+            (Lens::BrownConrady4 | Lens::BrownConrady5, true) => look!(true, false, true),
+            (Lens::BrownConrady4 | Lens::BrownConrady5, false) => look!(true, false, false),
+            (Lens::BrownConrady8 | Lens::BrownConrady12, true) => look!(true, true, true),
+            (Lens::BrownConrady8 | Lens::BrownConrady12, false) => look!(true, true, false),
+        }
+        let mut cost = 0.0;
+        for (i, k) in self.views.iter().enumerate() {
+            let (sight, at) = (&trial.sights[i / MAX_LANES], i % MAX_LANES);
+            if sight.whole[at] == 0.0 || !sight.cost[at].is_finite() {
+                return Err(*k);
+            }
+            cost += sight.cost[at];
+            if let Some(errors) = trial.errors.get(i / MAX_LANES) {
+                cost += correction(errors, at).norm_squared();
+            }
+        }
+        trial.cost = cost + self.model.chain_prior.as_ref().map_or(0.0, |p| p.cost(&trial.x, &trial.y));
+        Ok(())
+    }
+
+    /// Puts the robot's errors into the motions of the trial state.
+    fn err(&mut self) {
+        let Some(robot) = &self.model.robot else { return };
+        let groups = self.trial.motions.iter_mut().zip(&mut self.trial.errors);
+        for (group, (motions, errors)) in groups.enumerate() {
+            for (at, k) in self.views.iter().skip(group * MAX_LANES).take(MAX_LANES).enumerate() {
+                let root = robot.square_root(*k);
+                let twist = root * correction(errors, at);
+                let motion = self.problem.motion(*k);
+                let error = Se3::exp(&twist);
+                let moved = match robot.side {
+                    Side::Left => error * *motion,
+                    Side::Right => *motion * error,
+                };
+                set_lane(motions, at, &entries(&moved));
+                let moved_root: Matrix6<f64> = Se3::left_jacobian(&twist) * root;
+                let mut rows = [0.0; 36];
+                rows.copy_from_slice(moved_root.transpose().as_slice());
+                set_lane(&mut errors.root, at, &rows);
+            }
+        }
+    }
+
+    /// Normal equations at the current state, priors included.
+    fn assemble(&mut self, damping: f64) {
+        let x = entries(&self.current.x);
+        let noise = self.model.robot.as_ref().map(|robot| Noise {
+            side: robot.side,
+            x: &x,
+            motions: &self.motions,
+            errors: &mut self.current.errors,
+            damping,
+        });
+        (self.h, self.g) = dispatch(self.unit, Normal { sights: &self.current.sights, noise });
+        if let Some(prior) = &self.model.chain_prior {
+            let (x, y) = (&self.current.x, &self.current.y);
+            for (at, (information, gradient)) in [(0, prior.normal(true, x)), (6, prior.normal(false, y))] {
+                let mut block = self.h.fixed_view_mut::<6, 6>(at, at);
+                block += information;
+                let mut rows = self.g.fixed_rows_mut::<6>(at);
+                rows += gradient;
+            }
+        }
+    }
+}
+
+impl Engine for SideBySide<'_> {
+    fn cost(&self) -> f64 {
+        self.current.cost
+    }
+
+    fn propose(&mut self, damping: f64) -> Option<Proposal> {
+        self.assemble(damping);
+        let mut damped = self.h;
+        let mut penalty = 0.0;
+        let diagonal: Vector12 = Vector12::from_fn(|i, _| damping * self.h[(i, i)].max(1e-12));
+        for i in 0..12 {
+            damped[(i, i)] += diagonal[i];
+        }
+        self.step = damped.cholesky()?.solve(&-self.g);
+        if !self.step.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        for i in 0..12 {
+            penalty += diagonal[i] * self.step[i] * self.step[i];
+        }
+        Some(Proposal { predicted: penalty - self.g.dot(&self.step), largest: self.step.amax() })
+    }
+
+    fn attempt(&mut self) -> Option<f64> {
+        let xi_x: Vector6<f64> = self.step.fixed_rows::<6>(0).into_owned();
+        let xi_y: Vector6<f64> = self.step.fixed_rows::<6>(6).into_owned();
+        self.trial.x = Se3::exp(&xi_x) * self.current.x;
+        self.trial.y = Se3::exp(&xi_y) * self.current.y;
+        if self.model.robot.is_some() {
+            dispatch(
+                self.unit,
+                Correct {
+                    step: &self.step,
+                    sights: &self.current.sights,
+                    errors: &self.current.errors,
+                    out: &mut self.trial.errors,
+                },
+            );
+        }
+        self.look().ok().map(|()| self.trial.cost)
+    }
+
+    fn accept(&mut self) {
+        std::mem::swap(&mut self.current, &mut self.trial);
+    }
+
+    fn report(&mut self, initial_cost: f64, iterations: usize, ending: Ending) -> Solution {
+        self.assemble(0.0);
+        let mut prior_information = DMatrix::zeros(12, 12);
+        if let Some(prior) = &self.model.chain_prior {
+            prior_information.view_mut((0, 0), (6, 6)).copy_from(&prior.normal(true, &self.current.x).0);
+            prior_information.view_mut((6, 6), (6, 6)).copy_from(&prior.normal(false, &self.current.y).0);
+        }
+        let information = DMatrix::from_column_slice(12, 12, self.h.as_slice());
+        let mut correction_log_determinant = 0.0;
+        let views = self.views.iter().enumerate().map(|(i, k)| {
+            let (group, at) = (i / MAX_LANES, i % MAX_LANES);
+            let sight = &self.current.sights[group];
+            let pose = lane(&sight.pose, at);
+            let (mut twist, mut correction_cost) = (Vector6::zeros(), 0.0);
+            if let Some(robot) = &self.model.robot {
+                let errors = &self.current.errors[group];
+                let w = correction(errors, at);
+                twist = robot.square_root(*k) * w;
+                correction_cost = w.norm_squared();
+                correction_log_determinant += errors.log_determinant[at];
+            }
+            ViewReport {
+                view: *k,
+                rmse_px: (sight.squared_px[at] / self.problem.point_count(*k) as f64).sqrt(),
+                cost: sight.cost[at],
+                correction: twist,
+                correction_cost,
+                pose: Se3::new(Matrix3::from_row_slice(&pose[..9]), Vector3::from_column_slice(&pose[9..])),
+            }
+        });
+        let views = views.collect();
+        Solution {
+            x: self.current.x,
+            y: self.current.y,
+            camera: *self.problem.camera(),
+            board_scale: 0.0,
+            kinematic: DVector::zeros(0),
+            ending: if is_degenerate(&information) { Ending::Degenerate } else { ending },
+            information,
+            prior_information,
+            cost: self.current.cost,
+            initial_cost,
+            iterations,
+            views,
+            correction_log_determinant,
+        }
+    }
+}
