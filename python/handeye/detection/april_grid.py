@@ -1,9 +1,97 @@
-"""Corners of a board: being written."""
+"""Corners of the tags of an AprilGrid."""
 
-from handeye.detection.base import Detection, Image, NotFound, Reason
+import cv2
+import numpy as np
+
+from handeye.detection.base import Detection, Image, NotFound, Reason, ordered
+from handeye.detection.corner_fit import CornerKind, fit_corners
+from handeye.detection.diagnosis import diagnose
+from handeye.detection.markers import disagreement, find_markers, foreign_markers, from_neighbours
 from handeye.types import AprilGrid
+from handeye.types.arrays import FloatArray, IndexArray
+
+# Our corners of a tag among OpenCV's, see `handeye.types.AprilGrid`.
+_OPENCV_CORNERS = [1, 0, 3, 2]
+# Part of the space between tags that the window of a corner may take, and of the border that its strips may.
+WINDOW_SHARE = 0.8
+BAND_SHARE = 0.8
+# Corners further from where the tags around put them are not what they seem.
+ASTRAY_PX = 1.5
+THINNING_PX = (3, 5)
 
 
 def find(image: Image, target: AprilGrid) -> Detection | NotFound:
-    """Find nothing yet."""
-    return NotFound(Reason.NO_PATTERN, f"no detector yet for {target.family} ({image.shape})")
+    """Find the corners of the tags that are visible."""
+    ids, seen = _tags(image, target)
+    known = ids < target.rows * target.columns
+    if not known.any():
+        other = foreign_markers(image, target.dictionary, target.border_bits)
+        if other is None and len(find_markers(image, target.dictionary, 3 - target.border_bits)[0]):
+            other = NotFound(
+                Reason.INCONSISTENT,
+                f"the tags have a border of {3 - target.border_bits} bits, expected {target.border_bits}",
+            )
+        return other or diagnose(image, NotFound(Reason.NO_PATTERN, f"no tag of {target.dictionary}"))
+    if (~known).sum() > known.sum():
+        return NotFound(
+            Reason.INCONSISTENT,
+            f"{(~known).sum()} of {len(ids)} tags have numbers that the board described does not have",
+        )
+    tags, seen = ids[known], seen[known][:, _OPENCV_CORNERS]
+    points = tags[:, np.newaxis] * 4 + np.arange(4)
+    against = disagreement(target.points[points, :2], seen)
+    if against is not None:
+        return against
+    plane = target.points[points.ravel(), :2]
+    # The outline of a tag may run astray where a square touches it; the tags around know better.
+    expected = from_neighbours(plane, seen.reshape(-1, 2))
+    astray = np.linalg.norm(expected - seen.reshape(-1, 2), axis=1) > ASTRAY_PX
+    seen = np.where(astray[:, np.newaxis], expected, seen.reshape(-1, 2)).reshape(-1, 4, 2)
+    sharp = _measured(image, target, seen)
+    good = np.flatnonzero(np.isfinite(sharp[:, 0]))
+    expected = from_neighbours(plane[good], sharp[good])
+    good = good[np.linalg.norm(expected - sharp[good], axis=1) <= ASTRAY_PX]
+    if len(good) < 4:
+        return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
+    return ordered(target, points.ravel()[good], sharp[good])
+
+
+def _tags(image: Image, target: AprilGrid) -> tuple[IndexArray, FloatArray]:
+    """Return ids (M,) and corners (M, 4, 2) of the tags.
+
+    The squares that Kalibr prints between tags touch them at their corners, so that outlines may merge; in a
+    picture with thinner ink they are apart.
+    """
+    ids, seen = find_markers(image, target.dictionary, target.border_bits)
+    if target.border_bits == 1:
+        return ids, seen
+    for size in THINNING_PX:
+        thinned = np.asarray(cv2.dilate(image, np.ones((size, size), dtype=np.uint8)), dtype=np.uint8)
+        more, corners = find_markers(thinned, target.dictionary, target.border_bits)
+        new = ~np.isin(more, ids)
+        # Its edges have moved inwards by half the size: the corners belong further out on the diagonals.
+        outwards = corners - corners.mean(axis=1, keepdims=True)
+        outwards /= np.linalg.norm(outwards, axis=2, keepdims=True)
+        grown = corners + outwards * (size // 2) * np.sqrt(2.0)
+        ids, seen = np.concatenate([ids, more[new]]), np.concatenate([seen, grown[new]])
+    return ids, seen
+
+
+def _measured(image: Image, target: AprilGrid, tags: FloatArray) -> FloatArray:
+    """Return the corners (4 M, 2) of tags (M, 4, 2) as fitted, NaN where that fails."""
+    after = np.roll(tags, -1, axis=1) - tags
+    before = np.roll(tags, 1, axis=1) - tags
+    lengths = np.minimum(np.linalg.norm(after, axis=2), np.linalg.norm(before, axis=2)).reshape(-1)
+    directions = np.stack([after, before], axis=2).reshape(-1, 2, 2)
+    directions = directions / np.linalg.norm(directions, axis=2, keepdims=True)
+    height = lengths * np.abs(np.linalg.det(directions))
+    bits = {"16h5": 4, "25h9": 5}.get(target.dictionary.rsplit("_", 1)[-1], 6)
+    border = target.border_bits / (bits + 2 * target.border_bits)
+    return fit_corners(
+        image,
+        tags.reshape(-1, 2),
+        directions,
+        WINDOW_SHARE * target.spacing_ratio * height,
+        CornerKind.QUADRANTS,
+        bands=BAND_SHARE * min(border, target.spacing_ratio) * height,
+    )

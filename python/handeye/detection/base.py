@@ -1,6 +1,5 @@
 """What a detection is, and what a failure to detect says."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -148,14 +147,3 @@ def is_mirrored(plane: FloatArray, pixels: FloatArray) -> bool:
     Both the plane of the target and the image have x to the right and y down.
     """
     return float(np.linalg.det(affine(plane, pixels)[0])) < 0
-
-
-def bounding_box(
-    pixels: FloatArray, share: float, least_px: float, shape: Sequence[int]
-) -> tuple[slice, slice]:
-    """Return rows and columns around points (N, 2), larger by a share of the extent or `least_px`."""
-    low, high = pixels.min(axis=0), pixels.max(axis=0)
-    margin = max(least_px, share * float((high - low).max()))
-    left, top = np.maximum(np.floor(low - margin), 0).astype(int)
-    right, bottom = np.minimum(np.ceil(high + margin) + 1, [shape[1], shape[0]]).astype(int)
-    return slice(int(top), int(bottom)), slice(int(left), int(right))

@@ -1,25 +1,25 @@
 """Corners of a chessboard.
 
-Duda and Frese, "Accurate detection and localization of checkerboard corners for calibration" (BMVC 2018), as
-in `cv2.findChessboardCornersSB`: it fits a model of the corner to the filtered image and is about twice as
-accurate as iterating on gradients.
+Found by Duda and Frese, "Accurate detection and localization of checkerboard corners for calibration" (BMVC
+2018), as in `cv2.findChessboardCornersSB`, then measured by fitting a picture of a corner, see `corner_fit`.
 """
+
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from handeye.detection.base import Detection, Image, NotFound, Reason, bounding_box, is_mirrored, ordered
+from handeye.detection.base import Detection, Image, NotFound, Reason, is_mirrored, ordered
+from handeye.detection.corner_fit import CornerKind, fit_corners
 from handeye.detection.diagnosis import diagnose
 from handeye.types import Chessboard
 from handeye.types.arrays import FloatArray
 
 # Searching takes time with the number of pixels; a board that fills the image is found at this size too.
 SEARCH_SIDE_PX = 2000
-# Share of the board's extent left around it when corners are measured.
-MARGIN = 0.15
-# Two measurements of one corner further apart than this (RMS) are not of the same corners.
-AGREE_PX = 2.0
+# Part of a square's height that the window of a corner may take.
+WINDOW_SHARE = 0.8
 
 
 def find(image: Image, target: Chessboard) -> Detection | NotFound:
@@ -32,9 +32,19 @@ def find(image: Image, target: Chessboard) -> Detection | NotFound:
     coarse = _search(image, target)
     if coarse is None:
         return _explain(image, target)
-    coarse = _labeled(image, target, coarse)
-    fine = _measured(image, target, coarse)
-    return ordered(target, np.arange(target.point_count), coarse if fine is None else fine)
+    corners = _labeled(image, target, coarse)
+    edges = _edges(target, corners)
+    fitted = fit_corners(
+        image,
+        corners,
+        edges.directions,
+        WINDOW_SHARE * edges.heights,
+        CornerKind.CROSSING,
+        edges.curvatures,
+    )
+    # Where glare or a shadow's edge spoils the picture, what the search found is still the corner.
+    corners = np.where(np.isfinite(fitted), fitted, corners)
+    return ordered(target, np.arange(target.point_count), corners)
 
 
 def _search(image: Image, target: Chessboard) -> FloatArray | None:
@@ -53,22 +63,45 @@ def _search(image: Image, target: Chessboard) -> FloatArray | None:
     return found
 
 
-def _measured(image: Image, target: Chessboard, coarse: FloatArray) -> FloatArray | None:
-    """Return the corners measured around the board only, which takes a fifth of the time."""
-    rows, columns = bounding_box(coarse, MARGIN, 20, image.shape)
-    part = np.ascontiguousarray(image[rows, columns])
-    found = _corners(part, target, cv2.CALIB_CB_ACCURACY)
-    if found is None:
-        found = _corners(part, target, cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE)
-    if found is None:
-        return None
-    fine = found + np.array([columns.start, rows.start])
-    for turn in target.turns:  # the search may have begun at another end
-        turned = np.empty_like(fine)
-        turned[turn.permutation] = fine
-        if np.sqrt(((turned - coarse) ** 2).sum(axis=1).mean()) < AGREE_PX:
-            return turned
-    return None
+@dataclass(frozen=True)
+class _Edges:
+    """Edges of corners: directions (P, 2, 2), curvatures (P, 2) in 1 / px, least heights (P,) of squares."""
+
+    directions: FloatArray
+    curvatures: FloatArray
+    heights: FloatArray
+
+
+def _edges(target: Chessboard, corners: FloatArray) -> _Edges:
+    """Return what the neighbours of each corner tell about its edges."""
+    grid = corners.reshape(target.rows, target.columns, 2)
+    along_rows = _along(grid)
+    along_columns = [part.swapaxes(0, 1) for part in _along(grid.swapaxes(0, 1))]
+    directions = np.stack([along_rows[0], along_columns[0]], axis=2).reshape(-1, 2, 2)
+    curvatures = np.stack([along_rows[1], along_columns[1]], axis=2).reshape(-1, 2)
+    lengths = np.minimum(along_rows[2], along_columns[2]).ravel()
+    first, second = directions[:, 0], directions[:, 1]
+    sine = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    return _Edges(directions, curvatures, lengths * sine)
+
+
+def _along(grid: FloatArray) -> list[FloatArray]:
+    """Return directions (R, C, 2), curvatures and least steps (R, C) along the rows of a grid (R, C, 2)."""
+    steps = np.diff(grid, axis=1)
+    before = np.concatenate([steps[:, :1], steps], axis=1)
+    after = np.concatenate([steps, steps[:, -1:]], axis=1)
+    chord = before + after
+    length = np.linalg.norm(chord, axis=2)
+    direction = chord / length[:, :, np.newaxis]
+    bent = after - before
+    left = direction[..., 0] * bent[..., 1] - direction[..., 1] * bent[..., 0]
+    curvature = left / (length / 2) ** 2
+    # Ends take that of their neighbours; noise is averaged over three corners of each line.
+    curvature[:, 0], curvature[:, -1] = curvature[:, 1], curvature[:, -2]
+    padded = np.pad(curvature, ((0, 0), (1, 1)), mode="edge")
+    smooth = (padded[:, :-2] + padded[:, 1:-1] + padded[:, 2:]) / 3
+    shortest = np.minimum(np.linalg.norm(before, axis=2), np.linalg.norm(after, axis=2))
+    return [direction, smooth, shortest]
 
 
 def _corners(image: MatLike, target: Chessboard, flags: int) -> FloatArray | None:

@@ -1,0 +1,115 @@
+"""Square markers of a dictionary: finding them, and whether they lie as the board has them."""
+
+from functools import cache
+
+import cv2
+import numpy as np
+
+from handeye.detection.base import Image, NotFound, Reason, affine
+from handeye.types.arrays import FloatArray, IndexArray
+
+# Smallest perimeter of a marker, as a share of the longer side of the image.
+SMALLEST_PERIMETER_SHARE = 0.015
+# How far a marker may lie from where its neighbour expects it, as a share of their distance.
+TOLERANCE = 0.3
+CONSISTENT_SHARE = 0.75
+NEIGHBOURS = 12
+# One of each kind; smaller dictionaries are beginnings of these.
+_LARGEST = (
+    "DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL",
+    "DICT_APRILTAG_16h5", "DICT_APRILTAG_25h9", "DICT_APRILTAG_36h10", "DICT_APRILTAG_36h11",
+)  # fmt: skip
+
+
+def parameters(border_bits: int) -> cv2.aruco.DetectorParameters:
+    """Return OpenCV's parameters for markers whose corners are measured here, not there."""
+    chosen = cv2.aruco.DetectorParameters()
+    chosen.markerBorderBits = border_bits
+    chosen.minMarkerPerimeterRate = SMALLEST_PERIMETER_SHARE
+    chosen.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
+    return chosen
+
+
+@cache
+def dictionary(name: str) -> cv2.aruco.Dictionary:
+    """Return one of OpenCV's predefined dictionaries."""
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+
+
+def find_markers(image: Image, name: str, border_bits: int) -> tuple[IndexArray, FloatArray]:
+    """Return ids (M,) and corners (M, 4, 2) of markers, in OpenCV's order; no id twice."""
+    detector = cv2.aruco.ArucoDetector(dictionary(name), parameters(border_bits))
+    corners, ids, _ = detector.detectMarkers(image)
+    return unique(ids, corners)
+
+
+def unique(ids: object, corners: object) -> tuple[IndexArray, FloatArray]:
+    """Return OpenCV's markers as arrays (M,) and (M, 4, 2), without ids seen twice."""
+    numbers = np.zeros(0, dtype=np.int64) if ids is None else np.asarray(ids, dtype=np.int64).ravel()
+    places = np.asarray(corners, dtype=np.float64).reshape(-1, 4, 2)[: len(numbers)]
+    values, counts = np.unique(numbers, return_counts=True)
+    once = np.isin(numbers, values[counts == 1])
+    return numbers[once], places[once]
+
+
+def disagreement(plane: FloatArray, pixels: FloatArray) -> NotFound | None:
+    """Return why markers cannot be those of the board, None if they agree with it.
+
+    Each marker says by its own corners where its neighbour must be; so neither perspective nor lens matters.
+
+    Parameters
+    ----------
+    plane, pixels
+        (M, 4, 2) corners of the markers on the board and in the image.
+    """
+    if len(plane) < 2:
+        return None
+    centres, seen = plane.mean(axis=1), pixels.mean(axis=1)
+    away = np.linalg.norm(centres[:, np.newaxis] - centres, axis=2)
+    np.fill_diagonal(away, np.inf)
+    nearest = np.argmin(away, axis=1)
+    agree = 0
+    for index, other in enumerate(nearest):
+        A, b = affine(plane[index], pixels[index])
+        step = float(np.linalg.norm(seen[other] - seen[index]))
+        agree += float(np.linalg.norm(centres[other] @ A + b - seen[other])) < TOLERANCE * step
+    if agree >= CONSISTENT_SHARE * len(plane):
+        return None
+    return NotFound(
+        Reason.INCONSISTENT, f"only {agree} of {len(plane)} markers lie as they would on the board described"
+    )
+
+
+def foreign_markers(image: Image, expected: str, border_bits: int) -> NotFound | None:
+    """Return word of markers of another dictionary, None if there are none."""
+    kind = expected.rsplit("_", 1)[0]
+    for name in _LARGEST:
+        if name != expected and not ("X" in kind and name.startswith(kind)):
+            ids, _ = find_markers(image, name, border_bits)
+            if len(ids) >= 4:
+                evidence = f"{len(ids)} markers of the kind {name} are visible, expected {expected}"
+                return NotFound(Reason.INCONSISTENT, evidence)
+    return None
+
+
+def from_neighbours(plane: FloatArray, pixels: FloatArray) -> FloatArray:
+    """Return where (N, 2) the corners around it put each corner, by a homography that some of them may fail.
+
+    Parameters
+    ----------
+    plane, pixels
+        (N, 2) corners on the board and in the image; fewer than eight are returned as they are.
+    """
+    if len(plane) < 8:
+        return pixels.copy()
+    expected = pixels.copy()
+    away = np.linalg.norm(plane[:, np.newaxis] - plane, axis=2)
+    np.fill_diagonal(away, np.inf)
+    around = np.argsort(away, axis=1)[:, :NEIGHBOURS]
+    for index, others in enumerate(around):
+        H, _ = cv2.findHomography(plane[others], pixels[others], cv2.LMEDS)
+        # OpenCV gives None where no homography fits, whatever its types say.
+        if H is not None and np.isfinite(H).all():  # pyright: ignore[reportUnnecessaryComparison]
+            x, y, w = np.asarray(H, dtype=np.float64) @ [*plane[index], 1.0]
+            expected[index] = x / w, y / w
+    return expected
