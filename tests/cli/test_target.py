@@ -109,6 +109,7 @@ def test_a_person_is_told_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixtu
     printed = " ".join(capsys.readouterr().out.split())
     assert "landscape" in printed
     assert "measure both rulers" in printed
+    assert str(tmp_path / "a.toml") in printed
 
 
 @pytest.mark.parametrize(

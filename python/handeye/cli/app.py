@@ -10,6 +10,7 @@ COMMANDS = (
     ("validate", "handeye.cli.validate:validate", "Test how far a calibration holds."),
     ("import", "handeye.cli.importing:import_folder", "Turn images and robot poses into a recording."),
     ("export", "handeye.cli.export:export", "Write the answer in the format of another program."),
+    ("report", "handeye.cli.report:report", "Write one page about a calibration."),
     ("target", "handeye.cli.target:target", "Write a calibration target to print."),
     ("demo", "handeye.cli.demo:demo", "Show what choosing views is worth."),
     ("study", "handeye.cli.study:study", "Compare policies and models on public data."),

@@ -163,7 +163,7 @@ def _answer(
 
 def _show(console: "Console", text: str, output: Path | None, warnings: tuple[str, ...]) -> None:
     if output is not None:
-        console.print(f"written: {output}", markup=False)
+        console.print(f"written: {output}", markup=False, soft_wrap=True)
     else:
         # As it is, so that it can be redirected into a file: no wrapping, no colours.
         console.file.write(text)

@@ -200,12 +200,10 @@ def _show(console: "Console", sheet: Sheet, data: dict[str, Any]) -> None:
         [
             ("paper", f"{sheet.paper.name}, {way}"),
             ("edge to edge", f"{width:.2f} x {height:.2f} mm"),
-            ("page", data["page"]),
-            ("target file", data["config"]),
         ],
     )
     console.print(
-        "Print at 100 % and measure both rulers on the print; then: handeye solve FOLDER --target", end=" "
+        "Print at 100 %, measure both rulers on the print, then: handeye solve FOLDER --target FILE"
     )
-    console.print(data["config"], markup=False)
     notices(console, "Warnings", data["warnings"])
+    console.print(f"written: {data['page']} and {data['config']}", markup=False, soft_wrap=True)

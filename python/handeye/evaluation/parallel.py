@@ -1,7 +1,8 @@
 """Many independent pieces of work on several processes, with the same results however many there are."""
 
+import warnings
 from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import closing
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from joblib import Parallel, delayed, parallel_config  # pyright: ignore[reportUnknownVariableType]
@@ -49,8 +50,19 @@ def run_all(
         one: Any = 1
         pool: Any = Parallel(n_jobs=min(workers, len(pieces)), batch_size=one, return_as="generator")
         results: Generator[R] = pool(delayed(work)(piece) for piece in pieces)
-        with closing(results):  # left early, by an error or Ctrl-C, it ends its processes
+        with _left_without_a_word(results):
             return _gather(results, len(pieces), progress)
+
+
+@contextmanager
+def _left_without_a_word(results: Generator[R]) -> Generator[None]:
+    """End the processes when the results are left early, by an error or Ctrl-C, which joblib would warn of."""
+    try:
+        yield
+    finally:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message=".*tasks ", category=UserWarning, module="joblib")
+            results.close()
 
 
 def _gather(results: Iterable[R], total: int, progress: Progress | None) -> list[R]:

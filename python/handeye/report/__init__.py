@@ -1,0 +1,16 @@
+"""One self-contained page about a calibration, and its numbers as JSON."""
+
+from handeye.report.document import Report, from_dict, schema, to_dict
+from handeye.report.gathering import Gathered, gather_recording, gather_result
+from handeye.report.page import html_page
+
+__all__ = [
+    "Gathered",
+    "Report",
+    "from_dict",
+    "gather_recording",
+    "gather_result",
+    "html_page",
+    "schema",
+    "to_dict",
+]

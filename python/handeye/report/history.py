@@ -1,0 +1,68 @@
+"""How the answer came about: what would have been known after fewer views, and what a session tried."""
+
+from pathlib import Path
+
+import numpy as np
+
+from handeye.errors import HandeyeError
+from handeye.report.document import Attempt, CurvePoint, Request, Within
+from handeye.session.configuration import Configuration
+from handeye.session.loop import START_VIEWS
+from handeye.session.request import reach
+from handeye.session.store import JOURNAL_FILE, is_session, read_journal, read_settings
+from handeye.solving import Measurements, make_estimator
+from handeye.types.calibration import ModelName
+
+# Numbers of views that are looked at: each takes an estimate.
+MOST_POINTS = 14
+
+
+def curve(measurements: Measurements, model: ModelName) -> list[CurvePoint]:
+    """Return what would have been known after the first views, in the order of recording.
+
+    Numbers of views that do not determine the answer are left out.
+    """
+    count = len(measurements)
+    if count < START_VIEWS:
+        return []
+    steps = np.unique(
+        np.linspace(START_VIEWS, count, min(MOST_POINTS, count - START_VIEWS + 1)).round().astype(int)
+    )
+    estimator = make_estimator(model)
+    points: list[CurvePoint] = []
+    for views in steps.tolist():
+        try:
+            estimate = estimator(measurements.select(range(views)))
+        except HandeyeError:
+            continue
+        if estimate.determined:
+            now = reach(estimate)
+            within = Within(translation_mm=now.translation_mm, rotation_deg=now.rotation_deg)
+            points.append(CurvePoint(views=views, within_95=within))
+    return points
+
+
+def attempts(folder: Path) -> list[Attempt]:
+    """Return the attempts of a session that brought no view; none where the folder is no session."""
+    if not is_session(folder):
+        return []
+    entries, _ = read_journal(folder / JOURNAL_FILE)
+    return [
+        Attempt(label=entry.label, failure=entry.failure.value, detail=entry.detail)
+        for entry in entries
+        if entry.failure is not None
+    ]
+
+
+def request(folder: Path, within: Within) -> Request | None:
+    """Return what a session was asked for; None where the folder is no session or nothing was asked."""
+    if not is_session(folder):
+        return None
+    asked = Configuration.from_dict(read_settings(folder).get("configuration"))
+    if asked.accuracy_mm is None or asked.accuracy_deg is None:
+        return None
+    return Request(
+        translation_mm=asked.accuracy_mm,
+        rotation_deg=asked.accuracy_deg,
+        met=within.translation_mm <= asked.accuracy_mm and within.rotation_deg <= asked.accuracy_deg,
+    )
