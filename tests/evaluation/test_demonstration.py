@@ -91,6 +91,6 @@ def test_recording_without_truth(recording: Recording) -> None:
 def test_figure_shows_every_way(shown: Demonstration) -> None:
     figure = demonstration_figure(shown)
     words = " ".join(text.get_text() for text in figure.axes[0].texts)
-    for name in ("next best view", "random", "max distance", "taken as exact"):
+    for name in ("next best view", "random", "max distance", "paper's model"):
         assert name in words
     figure.canvas.draw()

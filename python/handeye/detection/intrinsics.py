@@ -3,11 +3,13 @@
 Zhang, "A flexible new technique for camera calibration" (PAMI 2000): the reprojection error over lens
 parameters and one pose for each view is minimised by Levenberg-Marquardt. It is the optimum that
 `cv2.calibrateCamera` seeks too, but for every lens of ours in the same way, with circles seen at their area
-centroids, and with the full covariance of the parameters.
+centroids, and with the full covariance of the parameters. Among lenses of more and more coefficients the one is
+kept that the views support (Schwarz, "Estimating the Dimension of a Model", Annals of Statistics 1978):
+coefficients that only follow the noise would pull the focal length with them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +26,11 @@ MIN_POINTS = 4
 START_FOCALS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
 # Views that choose among them.
 START_VIEWS = 8
+# From which a lens is chosen, where none is asked for. More coefficients take other parameters' place in ordinary
+# sets of views: whoever has such a lens says so.
+CHOICE = ("pinhole", "brown_conrady_4", "brown_conrady_5")
+# No detection is better: lenses that all fit to less are equally good.
+LEAST_NOISE_PX = 1e-3
 # Parameters known no better than this (focal length and centre, in image widths) are not known.
 LARGEST_SIGMA = 0.2
 
@@ -61,7 +68,7 @@ def calibrate_camera(
     detections: Mapping[str, Detection],
     size_px: tuple[int, int],
     *,
-    lens: str = "brown_conrady_5",
+    lens: str | None = None,
 ) -> CameraCalibration:
     """Calibrate a camera from the points found in several images of one target.
 
@@ -74,7 +81,8 @@ def calibrate_camera(
     size_px
         Width and height of the images.
     lens
-        Name of one of `handeye.types.LENSES`.
+        Name of one of `handeye.types.LENSES`; by default the one of `CHOICE` with the lowest Bayesian
+        information criterion.
 
     Raises
     ------
@@ -85,7 +93,7 @@ def calibrate_camera(
     SolveError
         The iteration does not converge.
     """
-    if lens not in LENSES:
+    if lens is not None and lens not in LENSES:
         raise InputError(f"lens {lens!r}, expected one of {', '.join(LENSES)}", code="unknown_lens")
     rejected = {
         name: f"{len(found)} points, at least {MIN_POINTS} are needed"
@@ -94,26 +102,49 @@ def calibrate_camera(
     }
     usable = {name: found for name, found in detections.items() if name not in rejected}
     _check_number(usable)
-    parameters = _start(lens, target, usable, size_px)
+    lenses = CHOICE if lens is None else (lens,)
+    # Without distortion all lenses of the choice are the same.
+    first = lenses[0]
+    begin = _start(first, target, usable, size_px)
     poses: dict[str, FloatArray] = {}
     for name, found in usable.items():
         try:
-            poses[name] = _pose(lens, parameters, target, found)[0]
+            poses[name] = _pose(first, begin, target, found)[0]
         except HandeyeError as error:
             rejected[name] = error.message
     usable = {name: usable[name] for name in poses}
     _check_number(usable)
     ids = np.concatenate([found.point_ids for found in usable.values()])
     start = Bundle(
-        lens=lens,
-        parameters=parameters,
+        lens=first,
+        parameters=begin,
         poses=np.array(list(poses.values())),
         points=target.points[ids],
         radii=target.radii_m[ids],
         pixels=np.concatenate([found.pixels for found in usable.values()]),
         counts=np.array([len(found) for found in usable.values()]),
     )
-    return _calibration(minimise(start), tuple(usable), size_px, rejected)
+    fits: list[tuple[float, CameraCalibration]] = []
+    failure: HandeyeError | None = None
+    for candidate in lenses:
+        parameters = np.concatenate([begin, np.zeros(len(LENSES[candidate]) - len(begin))])
+        try:
+            best = minimise(replace(start, lens=candidate, parameters=parameters))
+            fit = _calibration(best, tuple(usable), size_px, rejected)
+        except HandeyeError as error:
+            failure = error
+            continue
+        fits.append((_information_criterion(fit, len(ids)), fit))
+    if not fits:
+        assert failure is not None  # some lens was tried
+        raise failure
+    return min(fits, key=lambda fit: fit[0])[1]
+
+
+def _information_criterion(fit: CameraCalibration, points: int) -> float:
+    """Return Schwarz's criterion with the noise at its likeliest; what all lenses share is left out."""
+    mean_square = max(fit.rmse_px**2 / 2, LEAST_NOISE_PX**2)
+    return 2 * points * float(np.log(mean_square)) + len(fit.camera.parameters) * float(np.log(2 * points))
 
 
 def _calibration(

@@ -30,14 +30,14 @@ _LOOKS = {
     Way("next_best_view"): _Look("next best view", "#0072B2", "o"),
     Way("max_distance"): _Look("max distance", "#009E73", "^"),
     Way("random"): _Look("random", "#D98200", "s"),
-    Way("next_best_view", ModelName.PAPER): _Look(
-        "next best view, robot\nand camera taken as exact", _GREY, "D", "--"
-    ),
+    Way("next_best_view", ModelName.PAPER): _Look("next best, paper's model", _GREY, "D", "--"),
 }
 # Policies whose single starts are drawn too: all of them would hide each other.
 _SINGLY = (Way("next_best_view"), Way("random"))
 _TICKS = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50]
 _FEW_TICKS = [0.001, 0.01, 0.1, 1, 10, 100]
+# Of a line of text, in heights of the axis.
+_LABEL_HEIGHT = 0.05
 _INK = "#222222"
 
 
@@ -65,7 +65,9 @@ def _errors(axis: Axes, shown: Demonstration) -> None:
         ends.append((float(mean[-1]), look))
     axis.set_yscale("log")
     _plain_ticks(axis.yaxis, _TICKS)
-    for (value, look), height in zip(ends, _spread([value for value, _ in ends]), strict=True):
+    low, high = axis.get_ylim()
+    gap = _LABEL_HEIGHT * float(np.log(high / low))
+    for (value, look), height in zip(ends, _spread([value for value, _ in ends], gap), strict=True):
         axis.annotate(
             f"{value:.2g}  {look.label}",
             (views[-1], value),
@@ -106,7 +108,7 @@ def _honesty(axis: Axes, shown: Demonstration) -> None:
     _plain_ticks(axis.xaxis, _FEW_TICKS)
     _plain_ticks(axis.yaxis, _FEW_TICKS)
     axis.set_xlabel("error predicted (one standard deviation, mm)", loc="left")
-    _title(axis, "Whether it can be trusted", "error made in mm; grey: up to three times the prediction")
+    _title(axis, "Whether it can be trusted", "error made in mm; grey: within 3 times that predicted")
     axis.text(0.97, 0.05, "noise from the data (default)", color=_LOOKS[chosen].colour, ha="right",
               transform=axis.transAxes, fontsize=10)  # fmt: skip
     axis.text(0.03, 0.95, "robot and camera\ntaken as exact", color=_GREY, ha="left", va="top",
@@ -140,11 +142,10 @@ def _plain(value: float, _: int | None = None) -> str:
     return f"{value:g}"
 
 
-def _spread(values: list[float], ratio: float = 1.32) -> list[float]:
-    """Return heights for labels on a logarithmic axis, moved apart where they would touch."""
+def _spread(values: list[float], gap: float) -> list[float]:
+    """Return heights for labels on a logarithmic axis, moved apart where they would be closer than `gap`."""
     order = np.argsort(values)
     heights = np.log(np.array(values)[order])
-    gap = np.log(ratio)
     for _ in range(100):
         close = np.flatnonzero(np.diff(heights) < gap - 1e-9)
         if len(close) == 0:

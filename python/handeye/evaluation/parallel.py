@@ -56,7 +56,7 @@ def run_all(
 
 @contextmanager
 def _left_without_a_word(results: Generator[R]) -> Generator[None]:
-    """End the processes when the results are left early, by an error or Ctrl-C, which joblib would warn of."""
+    """End the processes when results are left early, by an error or Ctrl-C: joblib would warn of it."""
     try:
         yield
     finally:
