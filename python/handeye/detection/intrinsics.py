@@ -3,8 +3,8 @@
 Zhang, "A flexible new technique for camera calibration" (PAMI 2000): the reprojection error over lens
 parameters and one pose for each view is minimised by Levenberg-Marquardt. It is the optimum that
 `cv2.calibrateCamera` seeks too, but for every lens of ours in the same way, with circles seen at their area
-centroids, and with the full covariance of the parameters. Among lenses of more and more coefficients the one is
-kept that the views support (Schwarz, "Estimating the Dimension of a Model", Annals of Statistics 1978):
+centroids, and with the full covariance of the parameters. Among lenses of more and more coefficients the one
+that the views support is kept (Schwarz, "Estimating the Dimension of a Model", Annals of Statistics 1978):
 coefficients that only follow the noise would pull the focal length with them.
 """
 
@@ -26,8 +26,8 @@ MIN_POINTS = 4
 START_FOCALS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
 # Views that choose among them.
 START_VIEWS = 8
-# From which a lens is chosen, where none is asked for. More coefficients take other parameters' place in ordinary
-# sets of views: whoever has such a lens says so.
+# From which a lens is chosen, where none is asked for. Ordinary sets of views cannot tell further coefficients
+# from each other: whoever has such a lens says so.
 CHOICE = ("pinhole", "brown_conrady_4", "brown_conrady_5")
 # No detection is better: lenses that all fit to less are equally good.
 LEAST_NOISE_PX = 1e-3
@@ -125,19 +125,18 @@ def calibrate_camera(
         counts=np.array([len(found) for found in usable.values()]),
     )
     fits: list[tuple[float, CameraCalibration]] = []
-    failure: HandeyeError | None = None
+    failures: list[HandeyeError] = []
     for candidate in lenses:
         parameters = np.concatenate([begin, np.zeros(len(LENSES[candidate]) - len(begin))])
         try:
             best = minimise(replace(start, lens=candidate, parameters=parameters))
             fit = _calibration(best, tuple(usable), size_px, rejected)
         except HandeyeError as error:
-            failure = error
+            failures.append(error)
             continue
         fits.append((_information_criterion(fit, len(ids)), fit))
     if not fits:
-        assert failure is not None  # some lens was tried
-        raise failure
+        raise failures[0]
     return min(fits, key=lambda fit: fit[0])[1]
 
 
