@@ -26,8 +26,8 @@ MIN_POINTS = 4
 START_FOCALS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
 # Views that choose among them.
 START_VIEWS = 8
-# From which a lens is chosen, where none is asked for. Ordinary sets of views cannot tell further coefficients
-# from each other: whoever has such a lens says so.
+# From which a lens is chosen, where none is asked for. Ordinary views cannot tell further coefficients
+# from each other: whoever has a lens that needs them says so.
 CHOICE = ("pinhole", "brown_conrady_4", "brown_conrady_5")
 # No detection is better: lenses that all fit to less are equally good.
 LEAST_NOISE_PX = 1e-3
