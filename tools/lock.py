@@ -1,4 +1,4 @@
-"""Resolve requirements/dev.txt and run.txt from pyproject.toml, with hashes and without addresses.
+"""Resolve requirements/dev.txt, run.txt and bench.txt from pyproject.toml, with hashes and without addresses.
 
 Run by `make lock`. The resolver lives in a throw-away environment, so nobody needs it for anything else.
 """
@@ -36,7 +36,7 @@ def resolve(uv: Path, output: str, groups: list[str], constraints: str) -> None:
 
 
 def main() -> None:
-    """Resolve the full set first, then the small one inside it, so that both name the same versions."""
+    """Resolve the full set first, then the others inside it, so that all name the same versions."""
     with tempfile.TemporaryDirectory() as folder:
         venv.create(folder, with_pip=True)
         bin_folder = Path(folder) / ("Scripts" if os.name == "nt" else "bin")
@@ -44,6 +44,7 @@ def main() -> None:
         subprocess.run(pip, check=True)
         resolve(bin_folder / "uv", "requirements/dev.txt", ["dev", "docs"], "requirements/pins.txt")
         resolve(bin_folder / "uv", "requirements/run.txt", ["build"], "requirements/dev.txt")
+        resolve(bin_folder / "uv", "requirements/bench.txt", ["build", "bench"], "requirements/dev.txt")
 
 
 if __name__ == "__main__":
