@@ -54,7 +54,8 @@ class Squares(Pattern):
         """
         scaled = plane / self._side + 1.0
         index = np.floor(scaled).astype(np.int64)
-        inside = np.all((index >= 0) & (index < self._shape), axis=1)
+        column, row = index.T
+        inside = (column >= 0) & (row >= 0) & (column < self._shape[0]) & (row < self._shape[1])
         return index, scaled - index, inside
 
     def is_dark(self, plane: FloatArray) -> Mask:

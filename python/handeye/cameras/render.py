@@ -7,6 +7,7 @@ pixel.
 """
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -20,6 +21,8 @@ from handeye.types.arrays import FloatArray
 Image = NDArray[np.uint8]
 # Pixels sampled at a time: bounds the memory.
 _CHUNK = 20_000
+# Points along each edge of the board that say where in the picture it is, and pixels around it.
+_EDGE_POINTS, _AROUND_PX = 33, 4
 
 
 @dataclass(frozen=True)
@@ -78,9 +81,7 @@ class BoardRenderer:
         span = self._pattern.high - self._pattern.low
         margin = 0.1 * float(span.max()) if look.margin_m is None else look.margin_m
         self._low, self._high = self._pattern.low - margin, self._pattern.high + margin
-        u, v = np.meshgrid(np.arange(width + 1) - 0.5, np.arange(height + 1) - 0.5)
-        rays, _ = self.camera.unproject(np.column_stack([u.ravel(), v.ravel()]))
-        self._rays = rays.reshape(height + 1, width + 1, 3)
+        self._rays = _rays(self.camera)
 
     def image(self, T_camera_target: Pose, random: np.random.Generator | None = None) -> Image:
         """Return the picture (H, W) of the target in a pose.
@@ -100,8 +101,12 @@ class BoardRenderer:
         look = self.appearance
         if look.noise > 0 and random is None:
             raise InputError("noise needs a random generator", code="invalid_field")
-        board, ink = self._shares(T_camera_target)
-        grey = look.background * (1 - board) + look.light * (board - ink) + look.dark * ink
+        width, height = self.camera.size_px
+        rows, columns = self._region(T_camera_target)
+        board, ink = self._shares(T_camera_target, rows, columns)
+        grey = np.empty((height, width))
+        grey[:] = look.background
+        grey[rows, columns] = grey[rows, columns] * (1 - board) + look.light * (board - ink) + look.dark * ink
         if look.gradient != (0.0, 0.0):
             grey = grey * _light(grey.shape, look.gradient)
         if look.blur_px > 0:
@@ -110,29 +115,50 @@ class BoardRenderer:
             grey = grey + random.normal(scale=look.noise, size=grey.shape)
         return np.rint(np.clip(grey, 0, 255)).astype(np.uint8)
 
-    def _shares(self, T_camera_target: Pose) -> tuple[FloatArray, FloatArray]:
-        """Return the shares (H, W) of every pixel's area that show the board, and ink."""
-        corners = self._plane(T_camera_target)
+    def _region(self, T_camera_target: Pose) -> tuple[slice, slice]:
+        """Return the rows and columns that the board may be in; all of them where part of it is behind."""
+        width, height = self.camera.size_px
+        s = np.linspace(0, 1, _EDGE_POINTS)
+        zero, one = np.zeros_like(s), np.ones_like(s)
+        round_about = np.concatenate(
+            [np.column_stack(side) for side in ((s, zero), (s, one), (zero, s), (one, s))]
+        )
+        edge = np.zeros((len(round_about), 3))
+        edge[:, :2] = self._low + round_about * (self._high - self._low)
+        pixels, seen = self.camera.project(T_camera_target.act(edge))
+        if not seen.all():
+            return slice(0, height), slice(0, width)
+        low = np.floor(pixels.min(axis=0)).astype(int) - _AROUND_PX
+        high = np.ceil(pixels.max(axis=0)).astype(int) + 1 + _AROUND_PX
+        (left, top), (right, bottom) = low.clip(0).tolist(), high.clip(0, [width, height]).tolist()
+        return slice(min(top, bottom), bottom), slice(min(left, right), right)
+
+    def _shares(self, T_camera_target: Pose, rows: slice, columns: slice) -> tuple[FloatArray, FloatArray]:
+        """Return the shares (H, W) of the area of every pixel of a region that show the board, and ink."""
+        corners = self._plane(
+            T_camera_target, self._rays[rows.start : rows.stop + 1, columns.start : columns.stop + 1]
+        )
         height, width = corners.shape[0] - 1, corners.shape[1] - 1
         on_board, dark = (part.reshape(corners.shape[:2]) for part in self._look(corners.reshape(-1, 2)))
         board, ink = _mean_of_corners(on_board), _mean_of_corners(dark)
         finite = np.isfinite(corners[..., 0])
         whole = _mean_of_corners(finite) == 1
         mixed = whole & ((board % 1 != 0) | (ink % 1 != 0) | self._is_coarse(corners, board))
-        rows, columns = np.nonzero(mixed)
-        for start in range(0, len(rows), _CHUNK):
-            part = rows[start : start + _CHUNK], columns[start : start + _CHUNK]
+        some = np.nonzero(mixed)
+        for start in range(0, len(some[0]), _CHUNK):
+            part = some[0][start : start + _CHUNK], some[1][start : start + _CHUNK]
             board[part], ink[part] = self._sample(corners, *part)
         board[~whole] = ink[~whole] = 0.0
         return board.reshape(height, width), ink.reshape(height, width)
 
-    def _plane(self, T_camera_target: Pose) -> FloatArray:
-        """Return where (H + 1, W + 1, 2) the rays meet the plane of the target; NaN where they do not."""
+    @staticmethod
+    def _plane(T_camera_target: Pose, rays: FloatArray) -> FloatArray:
+        """Return where (H, W, 2) rays (H, W, 3) meet the plane of the target; NaN where they do not."""
         T_target_camera = T_camera_target.inverse().matrix
         eye = T_target_camera[:3, 3]
         if eye[2] >= 0:  # behind the board
-            return np.full((*self._rays.shape[:2], 2), np.nan)
-        direction = self._rays @ T_target_camera[:3, :3].T
+            return np.full((*rays.shape[:2], 2), np.nan)
+        direction = rays @ T_target_camera[:3, :3].T
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = -eye[2] / direction[:, :, 2]
             plane = eye[:2] + distance[:, :, np.newaxis] * direction[:, :, :2]
@@ -142,7 +168,9 @@ class BoardRenderer:
     def _look(self, plane: FloatArray) -> tuple[Mask, Mask]:
         """Tell which places (N, 2) are on the board, and which are dark."""
         with np.errstate(invalid="ignore"):
-            on_board = np.all((plane >= self._low) & (plane <= self._high), axis=1)
+            x, y = plane.T
+            (left, top), (right, bottom) = self._low, self._high
+            on_board = (x >= left) & (x <= right) & (y >= top) & (y <= bottom)
         dark = np.zeros(len(plane), dtype=bool)
         dark[on_board] = self._pattern.is_dark(plane[on_board])
         return on_board, dark
@@ -150,9 +178,9 @@ class BoardRenderer:
     def _is_coarse(self, corners: FloatArray, board: FloatArray) -> Mask:
         """Tell which pixels of the board might swallow a detail between their corners."""
         with np.errstate(invalid="ignore"):
-            across = np.abs(corners[1:, 1:] - corners[:-1, :-1]).max(axis=2)
-            along = np.abs(corners[1:, :-1] - corners[:-1, 1:]).max(axis=2)
-            return (board > 0) & (np.maximum(across, along) > 0.4 * self._pattern.finest_m)
+            diagonals = np.abs([corners[1:, 1:] - corners[:-1, :-1], corners[1:, :-1] - corners[:-1, 1:]])
+            longest = np.maximum(diagonals[..., 0], diagonals[..., 1]).max(axis=0)
+            return (board > 0) & (longest > 0.4 * self._pattern.finest_m)
 
     def _sample(
         self, corners: FloatArray, rows: NDArray[np.int64], columns: NDArray[np.int64]
@@ -204,6 +232,15 @@ def clutter(width_px: int, height_px: int, random: np.random.Generator, *, shape
             corners = np.rint(cv2.boxPoints(box)).astype(np.int32)
             cv2.fillConvexPoly(image, corners, grey, cv2.LINE_AA)
     return image
+
+
+@lru_cache(maxsize=2)
+def _rays(camera: Camera) -> FloatArray:
+    """Return the rays (H + 1, W + 1, 3) through the corners of all pixels, to be looked at only."""
+    width, height = camera.size_px
+    u, v = np.meshgrid(np.arange(width + 1) - 0.5, np.arange(height + 1) - 0.5)
+    rays, _ = camera.unproject(np.column_stack([u.ravel(), v.ravel()]))
+    return rays.reshape(height + 1, width + 1, 3)
 
 
 def _mean_of_corners(values: Mask) -> FloatArray:
