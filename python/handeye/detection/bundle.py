@@ -149,13 +149,19 @@ def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
-def minimise(bundle: Bundle) -> Bundle:
+def minimise(bundle: Bundle) -> tuple[Bundle, bool]:
     """Return the guess with the smallest sum of squared residuals, by Levenberg-Marquardt.
+
+    Returns
+    -------
+    tuple
+        The guess, and whether the iteration came to its end: parameters that the views do not determine may
+        drift for ever.
 
     Raises
     ------
     SolveError
-        No step helps although the end is not reached, or too many steps.
+        A point is out of sight of the first guess.
     """
     residuals = bundle.residuals()
     if residuals is None:
@@ -170,16 +176,12 @@ def minimise(bundle: Bundle) -> Bundle:
                 break
             damping *= 8
             if damping > STRONGEST_DAMPING:  # not even a vanishing step helps: this is the minimum
-                return bundle
+                return bundle, True
         gained = cost - lower
         bundle, residuals, cost, damping = trial, trial_residuals, lower, max(damping / 10, 1e-15)
         if gained <= COST_TOLERANCE * cost or cost < 1e-20 * len(residuals):
-            return bundle
-    raise SolveError(
-        f"camera calibration: no convergence in {MAX_ITERATIONS} steps",
-        code="not_converged",
-        hint="take more views, or a lens with fewer parameters",
-    )
+            return bundle, True
+    return bundle, False
 
 
 def _trial(bundle: Bundle, equations: NormalEquations, damping: float) -> tuple[Bundle, FloatArray | None]:

@@ -16,7 +16,7 @@ import numpy as np
 from handeye import _core
 from handeye.detection.base import Detection
 from handeye.detection.bundle import Bundle, minimise
-from handeye.errors import DegenerateError, HandeyeError, InputError
+from handeye.errors import DegenerateError, HandeyeError, InputError, SolveError
 from handeye.types import LENSES, Camera, Pose, Target
 from handeye.types.arrays import FloatArray
 
@@ -129,8 +129,15 @@ def calibrate_camera(
     for candidate in lenses:
         parameters = np.concatenate([begin, np.zeros(len(LENSES[candidate]) - len(begin))])
         try:
-            best = minimise(replace(start, lens=candidate, parameters=parameters))
+            best, converged = minimise(replace(start, lens=candidate, parameters=parameters))
+            # What the views do not determine drifts: that is then why there is no end.
             fit = _calibration(best, tuple(usable), size_px, rejected)
+            if not converged:
+                raise SolveError(
+                    f"camera calibration: no convergence with the lens {candidate}",
+                    code="not_converged",
+                    hint="take more views, or a lens with fewer parameters",
+                )
         except HandeyeError as error:
             failures.append(error)
             continue
