@@ -25,6 +25,9 @@ from handeye.types.pose import Pose
 
 # A camera calibration's covariance is a plain inverse of J'J: too small by about this factor in deviation.
 CAMERA_INFLATION = 1.5
+# No view's pixel noise is believed to be less. Even on rendered pictures corners err by a hundredth of a pixel
+# or so, much of it shared by neighbouring corners: such an error no number of points averages out.
+LEAST_PIXEL_SIGMA = 0.01
 # Degrees of freedom below which regions would have no useful quantile.
 FEWEST_DEGREES_OF_FREEDOM = 4.5
 # A mirrored pose is looked at where it fits less than this many times worse than the best.
@@ -142,6 +145,7 @@ class AutoEstimator:
             sides=sides,
             levels=options.levels,
             joints=None if arm is None else arm.errors(options.joint_noise_rad, options.joint_offset_rad),
+            floor_px2=LEAST_PIXEL_SIGMA**2,
         )
         parameters = np.array(measurements.camera.parameters)
         parameters[list(prior.free)] += posterior.camera_delta
