@@ -34,15 +34,20 @@ pub fn camera(py: Python<'_>, lens: &str, parameters: &Array<'_>) -> PyResult<Ca
 
 /// Features from points `(N, 3)` and radii `(N,)`; an error names the index.
 pub fn features(py: Python<'_>, points: &Array<'_>, radii: &Array<'_>) -> PyResult<Vec<Feature>> {
-    let points = convert::vectors::<3>(py, "points", points)?;
+    let points = convert::rows::<3>(py, "points", points)?;
     let radii = convert::scalars(py, "radii", radii)?;
-    if points.len() != radii.len() {
-        return Err(invalid(py, &format!("{} points but {} radii", points.len(), radii.len())));
+    let count = points.len() / 3;
+    if count != radii.len() {
+        return Err(invalid(py, &format!("{count} points but {} radii", radii.len())));
     }
-    let feature = |(i, (position, radius))| {
-        Feature::new(position, radius).map_err(|error| invalid(py, &format!("feature {i}: {error}")))
-    };
-    points.into_iter().zip(radii).enumerate().map(feature).collect()
+    // Collected into a `Result` it would grow step by step.
+    let mut features = Vec::with_capacity(count);
+    for (i, (position, radius)) in points.chunks_exact(3).zip(radii).enumerate() {
+        let feature = Feature::new(Vector3::from_column_slice(position), radius)
+            .map_err(|error| invalid(py, &format!("feature {i}: {error}")))?;
+        features.push(feature);
+    }
+    Ok(features)
 }
 
 #[pyfunction]

@@ -1,13 +1,13 @@
 //! numpy to nalgebra and back, with shape checks that name the argument.
 //!
 //! Everything is copied on the way in, so that the interpreter lock can be released afterwards; only long arrays that
-//! are read once ([`row_major`]) stay where they are.
+//! are read once ([`rows`], [`row_major`]) stay where they are.
 
 use std::borrow::Cow;
 
 use handeye_core::se3::Se3;
 use nalgebra::{Matrix4, SMatrix, SVector};
-use numpy::ndarray::{ArrayD, Axis, IxDyn};
+use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -39,15 +39,31 @@ pub fn vectors<const D: usize>(
     name: &str,
     array: &Array<'_>,
 ) -> PyResult<Vec<SVector<f64, D>>> {
-    check_shape(py, name, array, &[None, Some(D)])?;
-    let view = array.as_array();
-    Ok(view.axis_iter(Axis(0)).map(|row| SVector::from_iterator(row.iter().copied())).collect())
+    Ok(rows::<D>(py, name, array)?.chunks_exact(D).map(SVector::from_column_slice).collect())
 }
 
 /// Entries of an `(N,)` array.
 pub fn scalars(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Vec<f64>> {
     check_shape(py, name, array, &[None])?;
-    Ok(array.as_array().iter().copied().collect())
+    Ok(in_place(array).into_owned())
+}
+
+/// Entries of an `(N, D)` array in row-major order, in place where they lie that way.
+pub fn rows<'a, const D: usize>(
+    py: Python<'_>,
+    name: &str,
+    array: &'a Array<'_>,
+) -> PyResult<Cow<'a, [f64]>> {
+    check_shape(py, name, array, &[None, Some(D)])?;
+    Ok(in_place(array))
+}
+
+fn in_place<'a>(array: &'a Array<'_>) -> Cow<'a, [f64]> {
+    // A slice is given of column-major arrays too.
+    match array.as_slice() {
+        Ok(entries) if array.is_c_contiguous() => Cow::Borrowed(entries),
+        _ => Cow::Owned(array.as_array().iter().copied().collect()),
+    }
 }
 
 /// Matrices of an `(N, R, C)` array.
@@ -56,9 +72,7 @@ pub fn matrices<const R: usize, const C: usize>(
     name: &str,
     array: &Array<'_>,
 ) -> PyResult<Vec<SMatrix<f64, R, C>>> {
-    check_shape(py, name, array, &[None, Some(R), Some(C)])?;
-    let view = array.as_array();
-    Ok(view.axis_iter(Axis(0)).map(|m| SMatrix::from_row_iterator(m.iter().copied())).collect())
+    Ok(row_major::<R, C>(py, name, array)?.chunks_exact(R * C).map(SMatrix::from_row_slice).collect())
 }
 
 /// One `(R, C)` matrix.
@@ -85,10 +99,7 @@ pub fn row_major<'a, const R: usize, const C: usize>(
     array: &'a Array<'_>,
 ) -> PyResult<Cow<'a, [f64]>> {
     check_shape(py, name, array, &[None, Some(R), Some(C)])?;
-    Ok(match array.as_slice() {
-        Ok(entries) => Cow::Borrowed(entries),
-        Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
-    })
+    Ok(in_place(array))
 }
 
 /// Rigid transforms out of an `(N, 4, 4)` array; an error names the index.

@@ -60,18 +60,21 @@ fn group(problem: &Problem, views: &[usize]) -> Group {
     for lane in 0..MAX_LANES {
         // A lane without a view repeats the first, and counts for nothing.
         let samples = problem.samples(views[if lane < views.len() { lane } else { 0 }]);
-        let mut next = samples.clone();
-        for i in 0..longest {
-            let sample = next.next().unwrap_or(samples.start);
-            let (feature, pixel) = (&problem.features()[sample], &problem.pixels()[sample]);
-            let point = &mut points[i];
+        let features = &problem.features()[samples.clone()];
+        let pixels = &problem.pixels()[samples.clone()];
+        let repeated = std::iter::repeat((&features[0], &pixels[0]));
+        let all = features.iter().zip(pixels).chain(repeated);
+        for (point, (feature, pixel)) in points.iter_mut().zip(all) {
             for axis in 0..3 {
                 point.position[axis][lane] = feature.position[axis];
             }
             point.seen[0][lane] = (pixel.x - cx) / fx;
             point.seen[1][lane] = (pixel.y - cy) / fy;
+        }
+        for (i, rows) in whitening.iter_mut().enumerate() {
+            let sample = if i < samples.len() { samples.start + i } else { samples.start };
             if let Some(w) = problem.whitening(sample) {
-                for (row, value) in whitening[i].iter_mut().zip([w.m11, w.m21, w.m22]) {
+                for (row, value) in rows.iter_mut().zip([w.m11, w.m21, w.m22]) {
                     row[lane] = value;
                 }
             }
