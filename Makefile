@@ -32,10 +32,10 @@ help: ## list the targets
 	@printf 'handeye: make TARGET, one of\n'
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: build ## replay a shipped recording under three policies, print the table, draw the picture
-	$(say) 'handeye demo'
-	@mkdir -p out
-	@$(BIN)/handeye demo --picture out/demo.png
+demo: build ## drive a simulated arm under three policies, print the table, draw the picture, write the report
+	$(say) 'handeye demo --cell out/demo --picture out/demo.png (half a minute on two cores)'
+	@mkdir -p out && rm -rf out/demo
+	@$(BIN)/handeye demo --cell out/demo --picture out/demo.png
 
 test: check ## everything: the checks, the Rust tests, the Python tests, every example, every command in the README
 	$(say) 'cargo test'
