@@ -19,6 +19,10 @@ def test_a_session_is_run_resumed_and_solved(handeye: Handeye, tmp_path: Path) -
     assert data["request_met"] is True
     assert data["within_95"]["translation_mm"] <= 0.5
     assert data["true_error"]["translation_mm"] < 1.0
+    page = (folder / "report.html").read_text()
+    assert data["report"] == str(folder / "report.html")
+    # The page weighs the joints as the run did: both promise the same.
+    assert f"{data['within_95']['translation_mm']:.2f} mm" in page
     again = handeye.json("run", "--resume", "--session", folder)
     assert again == data
     solved = handeye.json("solve", folder)
@@ -26,6 +30,19 @@ def test_a_session_is_run_resumed_and_solved(handeye: Handeye, tmp_path: Path) -
     # Solving by hand need not weigh the joints; the answer is the same within what it claims.
     off = np.array(solved["T_flange_camera"]) - np.array(data["calibration"]["T_flange_camera"])
     assert np.abs(off[:3, 3]).max() < 1e-3
+
+
+def test_a_report_that_fails_does_not_fail_the_run(
+    handeye: Handeye, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("no paper left")
+
+    monkeypatch.setattr("handeye.report.gather_recording", broken)
+    outcome = handeye("run", "--session", tmp_path / "cell", *QUICK, "--json")
+    assert outcome.code == 0
+    assert outcome.data["report"] is None
+    assert "no paper left" in outcome.err
 
 
 def test_a_dry_run_moves_and_writes_nothing(handeye: Handeye, tmp_path: Path) -> None:

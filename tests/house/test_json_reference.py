@@ -122,6 +122,21 @@ def test_demo(handeye: Handeye, tmp_path: Path) -> None:
     assert (tmp_path / "demo.png").stat().st_size > 10_000
 
 
+def test_demo_of_a_cell(handeye: Handeye, tmp_path: Path) -> None:
+    folder, picture = tmp_path / "cell", tmp_path / "demo.png"
+    options = ("--cell", folder, "--picture", picture, "--starts", "1", "--points-only", "0.1")
+    compare("handeye demo --cell", handeye.json("demo", *options))
+    assert picture.stat().st_size > 10_000
+    assert (folder / "report.html").stat().st_size > 10_000
+
+
+def test_run(handeye: Handeye, tmp_path: Path) -> None:
+    session = handeye.json("run", "--session", tmp_path / "cell", "--points-only", "0.1", "--seed", "5")
+    # Its keys are those of solve.
+    session["calibration"] = None
+    compare("handeye run", session, handeye.json("run", "--dry-run"))
+
+
 @pytest.mark.parametrize("study", ["table1", "curves", "holdout", "injected"])
 def test_studies(handeye: Handeye, study: str) -> None:
     arguments = ("--data", shipped_recording().parent, "--sets", shipped_recording().name)

@@ -13,6 +13,7 @@ from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_new_folder
+from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
 from handeye.planning.feasibility import ViewLimits
@@ -125,7 +126,7 @@ def run(
     Three small turns about where the arm stands, then always to the view that teaches most. Without options
     everything is simulated. Every attempt is written into the session before the arm moves again; Ctrl-C
     stops the arm, and --resume goes on where it was. A session is a recording: solve, plan and validate take
-    it.
+    it. At the end a report on one page is written into it, report.html.
 
     Parameters
     ----------
@@ -338,6 +339,7 @@ def _plan(prepared: Prepared) -> Answer:
 
 def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end: End) -> Answer:
     hint = f"handeye run --resume --session {folder} goes on"
+    report = None if end.calibration is None else _report(folder, configuration.model)
     if end.reason is EndReason.TOO_MANY_FAILURES:
         raise DeviceError(end.sentence, code=end.reason, hint=hint)
     if end.reason is EndReason.NO_START:
@@ -356,6 +358,7 @@ def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end:
         }
     data: dict[str, Any] = {
         "session": str(folder),
+        "report": None if report is None else str(report),
         "end": end.reason.value,
         "sentence": end.sentence,
         "request_met": end.reason is EndReason.ACCURACY_REACHED,
@@ -367,6 +370,13 @@ def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end:
         "calibration": calibration.to_dict(),
     }
     return Answer(data, lambda console: _show(console, data, end, error))
+
+
+def _report(folder: Path, model: ModelName) -> Path | None:
+    report, trouble = report_of_session(folder, model)
+    if trouble:
+        print(f"warning: {trouble}", file=sys.stderr, flush=True)
+    return report
 
 
 def _show(console: "Console", data: Mapping[str, Any], end: End, error: Mapping[str, float] | None) -> None:
@@ -398,5 +408,7 @@ def _show(console: "Console", data: Mapping[str, Any], end: End, error: Mapping[
             )
         )
     rows.append(("written", data["session"]))
+    if data["report"] is not None:
+        rows.append(("report", data["report"]))
     pairs(console, rows)
     notices(console, "Warnings", calibration.warnings)

@@ -13,7 +13,7 @@ from handeye.importing import Opened
 from handeye.report import document
 from handeye.report.advice import advice
 from handeye.report.document import Answer, NoiseLevels, Open, Report, Said, ViewLine, Within
-from handeye.report.history import attempts, curve, request
+from handeye.report.history import arm_of, attempts, curve, request
 from handeye.report.recipe import recipe
 from handeye.report.regions import USUAL_DISTANCES_M, at_points, position_axes, rotation_axes, within
 from handeye.report.solved import Solved
@@ -86,7 +86,8 @@ def gather_recording(
     """
     recording = opened.recording
     measurements = Measurements.of_recording(recording)
-    calibration = calibrate(measurements, model, reduced=reduced)
+    kinematics = arm_of(opened.folder, recording, model)
+    calibration = calibrate(measurements, model, reduced=reduced, kinematics=kinematics)
     warnings = [str(warning) for warning in opened.warnings]
     solved = read_document(
         calibration.to_dict() | {"camera_origin": opened.camera_origin.value, "source": recording.source},
@@ -104,7 +105,7 @@ def gather_recording(
         warnings=[*warnings, *calibration.warnings],
         target=recording.target.to_dict(),
         views=[*lines, *_left_out(calibration, opened, {line.name for line in lines})],
-        curve=curve(measurements.select(used), model),
+        curve=curve(measurements.select(used), model, kinematics),
         attempts=attempts(opened.folder),
         request=request(opened.folder, known),
         true_error=_true_error(calibration, recording),

@@ -4,20 +4,40 @@ from pathlib import Path
 
 import numpy as np
 
-from handeye.errors import HandeyeError
+from handeye.errors import HandeyeError, InputError
 from handeye.report.document import Attempt, CurvePoint, Request, Within
+from handeye.robots import ArmKinematics, open_arm
 from handeye.session.configuration import Configuration
 from handeye.session.loop import START_VIEWS
 from handeye.session.request import reach
 from handeye.session.store import JOURNAL_FILE, is_session, read_journal, read_settings
 from handeye.solving import Measurements, make_estimator
+from handeye.types import Recording
 from handeye.types.calibration import ModelName
 
 # Numbers of views that are looked at: each takes an estimate.
 MOST_POINTS = 14
 
 
-def curve(measurements: Measurements, model: ModelName) -> list[CurvePoint]:
+def arm_of(folder: Path, recording: Recording, model: ModelName) -> ArmKinematics | None:
+    """Return the arm whose joints a session weighed; None where the folder is no session, or it did not.
+
+    An arm whose file is gone is not known either.
+    """
+    if not is_session(folder) or model is not ModelName.AUTO:
+        return None
+    asked = Configuration.from_dict(read_settings(folder).get("configuration"))
+    if not asked.joints_err or any(view.joints_rad is None for view in recording.views):
+        return None
+    try:
+        return ArmKinematics(open_arm(asked.robot))
+    except InputError:
+        return None
+
+
+def curve(
+    measurements: Measurements, model: ModelName, kinematics: ArmKinematics | None = None
+) -> list[CurvePoint]:
     """Return what would have been known after the first views, in the order of recording.
 
     Numbers of views that do not determine the answer are left out.
@@ -28,7 +48,7 @@ def curve(measurements: Measurements, model: ModelName) -> list[CurvePoint]:
     steps = np.unique(
         np.linspace(START_VIEWS, count, min(MOST_POINTS, count - START_VIEWS + 1)).round().astype(int)
     )
-    estimator = make_estimator(model)
+    estimator = make_estimator(model, kinematics)
     points: list[CurvePoint] = []
     for views in steps.tolist():
         try:
