@@ -57,12 +57,9 @@ check: build $(STAMPS)/dev ## format, lint, types, import directions
 	$(say) 'lint-imports'
 	@$(BIN)/lint-imports --no-logo
 
-bench: build $(STAMPS)/dev ## measure the core and the Python side on this machine
-	$(say) 'benchmarks'
-	@cargo bench --package handeye-core --locked
-	@for script in $(sort $(wildcard benchmarks/*.py)); do \
-		printf '== %s\n' "$$script"; $(BIN)/python "$$script" || exit 1; \
-	done
+bench: build $(STAMPS)/bench ## measure solver and scorer on this machine, side by side with their peers
+	$(say) 'handeye bench (about three minutes)'
+	@$(BIN)/handeye bench --output benchmarks
 
 docs: $(STAMPS)/dev ## build the documentation into docs/_build/html
 	$(say) 'sphinx-build docs docs/_build/html'
@@ -85,6 +82,12 @@ $(STAMPS)/dev: requirements/dev.txt $(STAMPS)/run
 	@$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements/dev.txt
 	@mkdir -p $(STAMPS) && touch $@
 
+# The peers that the benchmarks measure against; nothing else needs them.
+$(STAMPS)/bench: requirements/bench.txt $(STAMPS)/run
+	$(say) 'installing the pinned packages of requirements/bench.txt (a minute the first time)'
+	@$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements/bench.txt
+	@mkdir -p $(STAMPS) && touch $@
+
 # Rebuilt only when something it is made of has changed, or when the built library has been removed.
 $(STAMPS)/core: $(STAMPS)/run $(RUST_SOURCES) Cargo.toml Cargo.lock pyproject.toml $(if $(EXTENSION),,FORCE)
 	@command -v cargo >/dev/null || { echo 'a Rust toolchain (cargo, rustc) is needed' >&2; exit 1; }
@@ -96,7 +99,7 @@ FORCE:
 
 # The files it writes carry hashes and no addresses.
 lock: requirements/pins.txt pyproject.toml ## resolve requirements/*.txt anew from pyproject.toml (needs the registry)
-	$(say) 'resolving requirements/dev.txt and requirements/run.txt'
+	$(say) 'resolving requirements/dev.txt, run.txt and bench.txt'
 	@$(PYTHON) tools/lock.py
 
 clean: ## remove what was built; keep .venv

@@ -149,6 +149,10 @@ def test_coverage(handeye: Handeye) -> None:
     compare("handeye study coverage", data)
 
 
+def test_bench(handeye: Handeye) -> None:
+    compare("handeye bench", handeye.json("bench", "--quick", "--no-peers", "--budget-s", "0.002"))
+
+
 def test_errors(handeye: Handeye) -> None:
     outcome = handeye("solve", "nowhere", "--json")
     compare("Errors", outcome.data)

@@ -14,6 +14,7 @@ COMMANDS = (
     ("target", "handeye.cli.target:target", "Write a calibration target to print."),
     ("demo", "handeye.cli.demo:demo", "Show what choosing views is worth."),
     ("study", "handeye.cli.study:study", "Compare policies and models on public data."),
+    ("bench", "handeye.cli.bench:bench", "Measure speed on this machine, beside other libraries."),
 )
 
 

@@ -63,6 +63,24 @@ def check_new_folder(path: Path) -> None:
         raise OutputError(f"{path}: the folder {path.parent} does not exist", hint="create it first")
 
 
+def check_folder(path: Path | None) -> None:
+    """Make the folder that several files will be written into, before the work rather than after it.
+
+    Raises
+    ------
+    OutputError
+        It cannot be made.
+    """
+    if path is None:
+        return
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"{path}: cannot be made a folder ({(error.strerror or str(error)).lower()})"
+        ) from error
+
+
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
     """Write one JSON object.
 
