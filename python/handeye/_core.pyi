@@ -8,7 +8,7 @@ A wrong shape, a parameter out of its range or a transform that is not rigid rai
 
 from typing import TypeAlias
 
-from numpy import bool_, float64
+from numpy import bool_, float32, float64, uint8
 from numpy.typing import ArrayLike, NDArray
 
 # Rigid transforms
@@ -83,6 +83,36 @@ def planar_pose(
 
     Each is `T_camera_target` (4, 4), its error in px (root mean square over the points of the residual)
     and its information (6, 6) at a pixel noise of 1 px.
+    """
+
+# Measuring in pictures
+
+def fit_corners(
+    image: NDArray[float32],
+    places: ArrayLike,
+    directions: ArrayLike,
+    curvatures: ArrayLike,
+    radii: ArrayLike,
+    bands: ArrayLike,
+    is_crossing: bool,
+    smoothing_px: float,
+) -> NDArray[float64]:
+    """Corners (N, 2) fitted to grey values; NaN where there is none near the guess.
+
+    `image` (H, W) is contiguous and was smoothed by a Gaussian of `smoothing_px`. `places` (N, 2) are
+    guesses, `directions` (N, 2, 2) those of the two edges, `curvatures` (N, 2) theirs in 1 / px towards the
+    normals (-sin, cos); `radii` (N,) are free of other edges and `bands` (N,) the distances from the edges,
+    in pixels, beyond which there is something else. At a crossing diagonal parts are equal and the light may
+    change; else the four parts may be of any grey.
+    """
+
+def area_centroids(
+    image: NDArray[uint8], centres: ArrayLike, shapes: ArrayLike, gaps: ArrayLike
+) -> tuple[NDArray[float64], NDArray[float64]]:
+    """Area centroids (N, 2) and shapes (N, 2, 2) of spots; NaN where there is no contrast or one is cut.
+
+    `image` (H, W) is contiguous; `centres` (N, 2) and `shapes` (N, 2, 2) are guesses, `x' S^-1 x = 1` for x
+    from the centre to the edge; `gaps` (N,) are the free distances to the next spot in pixels.
     """
 
 # Closed-form starts

@@ -11,6 +11,7 @@ pub mod information;
 pub mod kinematics;
 mod lanes;
 pub mod least_squares;
+pub mod picture;
 pub mod planar_pose;
 pub mod planning;
 pub mod pose;

@@ -15,6 +15,7 @@ mod geometry;
 mod information;
 mod kinematics;
 mod model;
+mod picture;
 mod planar_pose;
 mod planning;
 mod problem;
@@ -26,6 +27,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     evidence::register(module)?;
     geometry::register(module)?;
     kinematics::register(module)?;
+    picture::register(module)?;
     planar_pose::register(module)?;
     planning::register(module)?;
     problem::register(module)?;

@@ -9,7 +9,7 @@ import numpy as np
 
 from handeye.detection.base import Detection, Image, NotFound, Reason, ordered
 from handeye.detection.blobs import Spots, areas, find_spots
-from handeye.detection.centroid import area_centroid
+from handeye.detection.centroid import area_centroids
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.lattice import Placement, grow, placements
 from handeye.types import CircleGrid
@@ -103,11 +103,11 @@ def _measured(
     used = placed[0].spots[placed[0].spots >= 0]
     pixels = np.full((len(spots), 2), np.nan)
     shapes = spots.shapes.copy()
-    for spot, gap in zip(used, _gaps(spots.take(used)), strict=True):
-        measured = area_centroid(image, spots.centres[spot], spots.shapes[spot], gap)
-        if measured is not None:
-            pixels[spot], shapes[spot] = measured
+    circles = spots.take(used)
+    measured = area_centroids(image, circles, _gaps(circles))
+    pixels[used] = measured.centres
     good = np.isfinite(pixels[:, 0])
+    shapes[used] = np.where(good[used, np.newaxis, np.newaxis], measured.shapes, circles.shapes)
     if good[used].sum() < LEAST_SHARE * target.point_count:
         return NotFound(Reason.LOW_CONTRAST, f"only {good[used].sum()} circles have enough contrast")
     chosen = placed[0].spots

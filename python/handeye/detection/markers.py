@@ -14,6 +14,9 @@ SMALLEST_PERIMETER_SHARE = 0.015
 TOLERANCE = 0.3
 CONSISTENT_SHARE = 0.75
 NEIGHBOURS = 12
+# Corners are weighed anew so many times; those closer than this to where they should be all count the same.
+WEIGHINGS = 8
+FINEST_PX = 0.05
 # One of each kind; smaller dictionaries are beginnings of these.
 _LARGEST = (
     "DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL",
@@ -95,6 +98,9 @@ def foreign_markers(image: Image, expected: str, border_bits: int) -> NotFound |
 def from_neighbours(plane: FloatArray, pixels: FloatArray) -> FloatArray:
     """Return where (N, 2) the corners around it put each corner, by a homography that some of them may fail.
 
+    The sum of distances is minimised rather than that of their squares, by weighing (Weiszfeld 1937), so that
+    a few corners far off count little.
+
     Parameters
     ----------
     plane, pixels
@@ -102,14 +108,39 @@ def from_neighbours(plane: FloatArray, pixels: FloatArray) -> FloatArray:
     """
     if len(plane) < 8:
         return pixels.copy()
-    expected = pixels.copy()
     away = np.linalg.norm(plane[:, np.newaxis] - plane, axis=2)
     np.fill_diagonal(away, np.inf)
     around = np.argsort(away, axis=1)[:, :NEIGHBOURS]
-    for index, others in enumerate(around):
-        H, _ = cv2.findHomography(plane[others], pixels[others], cv2.LMEDS)
-        # OpenCV gives None where no homography fits, whatever its types say.
-        if H is not None and np.isfinite(H).all():  # pyright: ignore[reportUnnecessaryComparison]
-            x, y, w = np.asarray(H, dtype=np.float64) @ [*plane[index], 1.0]
-            expected[index] = x / w, y / w
-    return expected
+    # Coordinates about each corner, of size one; then the corner itself is at the origin of the plane.
+    x, _ = _about(plane[around], plane)
+    u, extent = _about(pixels[around], pixels)
+    x1 = np.concatenate([x, np.ones((*x.shape[:2], 1))], axis=2)
+    rows = np.zeros((len(x), 2, x.shape[1], 8))
+    rows[:, 0, :, :3] = rows[:, 1, :, 3:6] = x1
+    rows[:, 0, :, 6:] = -u[..., :1] * x
+    rows[:, 1, :, 6:] = -u[..., 1:] * x
+    wanted = u.transpose(0, 2, 1)
+    weights = np.ones(x.shape[:2])
+    homography: FloatArray = np.zeros((len(x), 8))
+    floor = FINEST_PX / extent[:, 0, 0, np.newaxis]
+    for _ in range(WEIGHINGS):
+        weighted = rows * weights[:, np.newaxis, :, np.newaxis]
+        normal = _sum("nkia,nkib->nab", weighted, rows) + 1e-12 * np.eye(8)
+        right = _sum("nkia,nki->na", weighted, wanted)
+        homography = np.asarray(np.linalg.solve(normal, right[..., np.newaxis]), dtype=np.float64)[..., 0]
+        miss = np.linalg.norm(_sum("nkia,na->nki", rows, homography) - wanted, axis=1)
+        weights = 1 / np.maximum(miss, floor)
+        weights /= weights.max(axis=1, keepdims=True)
+    # Where the origin of the plane comes to lie.
+    return pixels + homography[:, [2, 5]] * extent[:, 0]
+
+
+def _sum(indices: str, *factors: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum(indices, *factors), dtype=np.float64)
+
+
+def _about(places: FloatArray, middles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return places (N, M, 2) relative to the middles (N, 2), of size one, and what one was (N, 1, 1)."""
+    offset = places - middles[:, np.newaxis]
+    size = np.maximum(np.abs(offset).max(axis=(1, 2), keepdims=True), 1e-12)
+    return offset / size, size

@@ -1,0 +1,246 @@
+//! The picture of a corner and the normal equations of its fit, several pixels side by side.
+
+#![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::simd::{Kernel, MAX_LANES, Simd, Vector};
+
+pub(super) const N: usize = 9;
+// Parameters: place, angles of the edges, logarithm of the blur, then the greys, which enter linearly.
+pub(super) const X: usize = 0;
+pub(super) const Y: usize = 1;
+pub(super) const FIRST: usize = 2;
+pub(super) const SECOND: usize = 3;
+pub(super) const LOG_BLUR: usize = 4;
+pub(super) const MEAN: usize = 5;
+pub(super) const A: usize = 6;
+pub(super) const B: usize = 7;
+pub(super) const PRODUCT: usize = 8;
+
+/// Further from an edge than so many deviations of the blur there is only one side.
+const FAR: f64 = 6.0;
+
+/// Pixels of a window: places relative to the window's origin, grey values and weights.
+#[derive(Default)]
+pub(super) struct Samples {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    grey: Vec<f64>,
+    weight: Vec<f64>,
+}
+
+impl Samples {
+    pub fn push(&mut self, [x, y]: [f64; 2], grey: f64, weight: f64) {
+        self.x.push(x);
+        self.y.push(y);
+        self.grey.push(grey);
+        self.weight.push(weight);
+    }
+
+    /// Fills the last vector with pixels that do not count.
+    pub fn pad(&mut self) {
+        while !self.x.len().is_multiple_of(MAX_LANES) {
+            self.push([0.0; 2], 0.0, 0.0);
+        }
+    }
+}
+
+/// `J' W J`, `J' W r` and the weighted sum of squares.
+pub(super) struct Equations {
+    pub normal: SMatrix<f64, N, N>,
+    pub right: SVector<f64, N>,
+    pub cost: f64,
+}
+
+/// Adds the equations up over the pixels, for parameters and curvatures of the edges.
+pub(super) struct Sum<'a, const IS_CROSSING: bool> {
+    pub samples: &'a Samples,
+    pub p: [f64; N],
+    pub bends: [f64; 2],
+}
+
+/// A blurred edge at pixels: side runs from -1 to 1, slope is its derivative in the distance.
+struct Edge<V> {
+    distance: V,
+    along: V,
+    side: V,
+    slope: V,
+}
+
+impl<const IS_CROSSING: bool> Kernel for Sum<'_, IS_CROSSING> {
+    type Output = Equations;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Equations {
+        let p = self.p.map(|x| simd.splat(x));
+        let inverse_blur = simd.splat((-self.p[LOG_BLUR]).exp());
+        let turn = |i: usize| {
+            let (sine, cosine) = self.p[i].sin_cos();
+            [simd.splat(sine), simd.splat(cosine)]
+        };
+        let turns = [turn(FIRST), turn(SECOND)];
+        let half_bends = self.bends.map(|bend| simd.splat(0.5 * bend));
+        let zero = simd.splat(0.0);
+        let mut upper = [[zero; N]; N];
+        let mut right = [zero; N];
+        let mut cost = zero;
+        for at in (0..self.samples.x.len()).step_by(S::LANES) {
+            let x = simd.load(&self.samples.x[at..]) - p[X];
+            let y = simd.load(&self.samples.y[at..]) - p[Y];
+            let weight = simd.load(&self.samples.weight[at..]);
+            let first = edge(simd, x, y, turns[0], inverse_blur, half_bends[0]);
+            let second = edge(simd, x, y, turns[1], inverse_blur, half_bends[1]);
+            let both = first.side * second.side;
+            let (basis, drift) =
+                if IS_CROSSING { ([x, y], [p[A], p[B]]) } else { ([first.side, second.side], [zero; 2]) };
+            let (mut by_first, mut by_second) = (p[PRODUCT] * second.side, p[PRODUCT] * first.side);
+            if !IS_CROSSING {
+                by_first = by_first + p[A];
+                by_second = by_second + p[B];
+            }
+            let predicted = p[A].mul_add(basis[0], p[B].mul_add(basis[1], p[PRODUCT].mul_add(both, p[MEAN])));
+            let (across_first, across_second) = (by_first * first.slope, by_second * second.slope);
+            let jacobian = [
+                across_first.mul_add(turns[0][0], across_second * turns[1][0]) - drift[0],
+                -across_first.mul_add(turns[0][1], across_second * turns[1][1]) - drift[1],
+                -(across_first * first.along),
+                -(across_second * second.along),
+                -across_first.mul_add(first.distance, across_second * second.distance),
+                simd.splat(1.0),
+                basis[0],
+                basis[1],
+                both,
+            ];
+            let residual = simd.load(&self.samples.grey[at..]) - predicted;
+            cost = (weight * residual).mul_add(residual, cost);
+            for i in 0..N {
+                let weighted = weight * jacobian[i];
+                right[i] = weighted.mul_add(residual, right[i]);
+                for k in i..N {
+                    upper[i][k] = weighted.mul_add(jacobian[k], upper[i][k]);
+                }
+            }
+        }
+        let mut normal = SMatrix::zeros();
+        let mut sums = SVector::zeros();
+        for i in 0..N {
+            sums[i] = right[i].sum();
+            for k in i..N {
+                normal[(i, k)] = upper[i][k].sum();
+                normal[(k, i)] = normal[(i, k)];
+            }
+        }
+        Equations { normal, right: sums, cost: cost.sum() }
+    }
+}
+
+/// A parabola stands for the arc of a bent edge; its derivatives, which matter little to a step, are left out.
+#[inline(always)]
+fn edge<S: Simd>(
+    simd: S,
+    x: S::Vector,
+    y: S::Vector,
+    [sine, cosine]: [S::Vector; 2],
+    inverse_blur: S::Vector,
+    half_bend: S::Vector,
+) -> Edge<S::Vector> {
+    let along = cosine.mul_add(x, sine * y);
+    let straight = sine.neg_mul_add(x, cosine * y);
+    let distance = (half_bend * along).neg_mul_add(along, straight);
+    let scaled = distance * inverse_blur;
+    // The smaller of the two is the negative of the larger of their negatives.
+    let far = -(-scaled.abs()).max(simd.splat(-FAR));
+    let bell = bell(simd, far);
+    let slope = simd.splat((2.0 * std::f64::consts::FRAC_1_PI).sqrt()) * bell * inverse_blur;
+    let magnitude = error_function(simd, far * simd.splat(std::f64::consts::FRAC_1_SQRT_2), bell);
+    let side = magnitude.keep_or(scaled.at_least(simd.splat(0.0)), -magnitude);
+    Edge { distance, along, side, slope }
+}
+
+/// `exp(-x^2 / 2)` for `x` up to [`FAR`]: the series of its 64th root, squared six times; good to 1e-9.
+#[inline(always)]
+fn bell<S: Simd>(simd: S, x: S::Vector) -> S::Vector {
+    let z = x * x * simd.splat(-0.5 / 64.0);
+    let mut root = simd.splat(1.0 / 40_320.0);
+    for factorial in [5_040.0, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0, 1.0] {
+        root = root.mul_add(z, simd.splat(1.0 / factorial));
+    }
+    for _ in 0..6 {
+        root = root * root;
+    }
+    root
+}
+
+/// The error function of `x >= 0`, given `exp(-x^2)`; Abramowitz and Stegun 7.1.26, good to 1.5e-7.
+#[inline(always)]
+fn error_function<S: Simd>(simd: S, x: S::Vector, bell: S::Vector) -> S::Vector {
+    let one = simd.splat(1.0);
+    let t = one / simd.splat(0.327_591_1).mul_add(x, one);
+    let mut series = simd.splat(1.061_405_429);
+    for coefficient in [-1.453_152_027, 1.421_413_741, -0.284_496_736, 0.254_829_592] {
+        series = series.mul_add(t, simd.splat(coefficient));
+    }
+    (series * t).neg_mul_add(bell, one)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{VectorUnit, dispatch};
+    use crate::testing::Random;
+
+    fn window() -> Samples {
+        let mut random = Random::new(3);
+        let mut samples = Samples::default();
+        for i in 0..169 {
+            let place = [f64::from(i % 13) - 6.0, f64::from(i / 13) - 6.0];
+            samples.push(place, 100.0 + 50.0 * random.normal(), random.normal().abs());
+        }
+        samples.pad();
+        samples
+    }
+
+    const P: [f64; N] = [0.2, -0.3, 0.2, 1.6, 0.3, 100.0, 3.0, -2.0, 50.0];
+
+    fn sum(unit: VectorUnit, samples: &Samples, p: [f64; N], is_crossing: bool) -> Equations {
+        let bends = [0.001, -0.002];
+        if is_crossing {
+            dispatch(unit, Sum::<true> { samples, p, bends })
+        } else {
+            dispatch(unit, Sum::<false> { samples, p, bends })
+        }
+    }
+
+    #[test]
+    fn units_agree() {
+        let samples = window();
+        for is_crossing in [true, false] {
+            let expected = sum(VectorUnit::Portable, &samples, P, is_crossing);
+            for unit in VectorUnit::ALL {
+                let found = sum(unit, &samples, P, is_crossing);
+                assert!((found.normal - expected.normal).norm() < 1e-9 * expected.normal.norm());
+                assert!((found.right - expected.right).norm() < 1e-9 * expected.right.norm());
+            }
+        }
+    }
+
+    #[test]
+    fn the_right_side_is_the_slope_of_the_cost() {
+        let samples = window();
+        for is_crossing in [true, false] {
+            let here = sum(VectorUnit::Portable, &samples, P, is_crossing);
+            for i in 0..N {
+                let cost = |by: f64| {
+                    let mut p = P;
+                    p[i] += by;
+                    sum(VectorUnit::Portable, &samples, p, is_crossing).cost
+                };
+                let slope = (cost(1e-4) - cost(-1e-4)) / 2e-4;
+                // The derivatives of the bend are left out, and the error function is good to 1.5e-7.
+                let scale = here.right.amax();
+                assert!((slope + 2.0 * here.right[i]).abs() < 0.01 * scale, "{i}: {slope} {}", here.right[i]);
+            }
+        }
+    }
+}
