@@ -252,10 +252,11 @@ def test_millimetres_everywhere_are_warned_of(handeye: Handeye, tmp_path: Path) 
 
 @pytest.mark.parametrize("model", ["auto", "paper"])
 def test_millimetres_of_the_robot_alone(handeye: Handeye, tmp_path: Path, model: str) -> None:
-    """No answer can be right; whether one comes out or not, the cause is named."""
+    """No answer can be right, and the cause is named."""
     folder = written(scaled(made_recording(8), 1000), tmp_path / "made")
     outcome = handeye("solve", folder, "--model", model, "--json")
-    assert outcome.code in {0, 4, 6}
+    assert outcome.error["code"] == "wrong_unit"
+    assert outcome.code == 3
     assert "are these millimetres?" in outcome.data["warnings"][0]
     outcome = handeye("solve", folder, "--model", model)
     assert "are these millimetres?" in " ".join((outcome.out + outcome.err).split())

@@ -39,12 +39,17 @@ class ErrorKind(StrEnum):
     """The robot is exact; the camera's parameters are off by more than their covariance says."""
 
 
+TARGET = Chessboard(8, 11, 0.025)
+
+
 @dataclass(frozen=True)
 class CellOptions:
     """What a cell is drawn from; ranges are drawn from uniformly, levels of errors log-uniformly.
 
     Parameters
     ----------
+    mounting, target
+        Where the camera sits, and the board.
     views
         Fewest and most views.
     pixel_sigma_px
@@ -62,6 +67,7 @@ class CellOptions:
     """
 
     mounting: Mounting = Mounting.EYE_IN_HAND
+    target: Target = TARGET
     views: tuple[int, int] = (8, 12)
     pixel_sigma_px: tuple[float, float] = (0.05, 0.2)
     translation_sigma_m: tuple[float, float] = (0.05e-3, 0.5e-3)
@@ -77,7 +83,6 @@ class CellOptions:
     roll_deg: tuple[float, float] = (-90.0, 90.0)
 
 
-TARGET = Chessboard(8, 11, 0.025)
 LENS = "brown_conrady_5"
 PARAMETERS = np.array([1400.0, 1400.0, 640.0, 512.0, -0.1, 0.05, 0.0005, -0.0005, 0.0])
 SIZE_PX = (1280, 1024)
@@ -112,16 +117,19 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
     joints, camera_poses = _views(random, arm, true_camera, X, Y, count, options)
     reported, read = _reported(random, kind, arm, joints, options)
     views: list[View] = []
-    ids = np.arange(TARGET.point_count)
+    target = options.target
+    ids = np.arange(target.point_count)
     for k, (pose, T_camera_target) in enumerate(zip(reported, camera_poses, strict=True)):
-        pixels, _ = true_camera.project(_in_camera(T_camera_target))
+        pixels, _ = _core.project_features(
+            LENS, true_camera.parameters, T_camera_target, target.points, target.radii_m
+        )
         pixels = pixels + pixel_sigma * random.standard_normal(pixels.shape)
         views.append(View(f"view_{k + 1:02d}", Pose(pose), ids, pixels, joints_rad=read[k].tolist()))
     return Recording(
         f"simulated {kind.value} {number}",
         options.mounting,
         Camera(LENS, PARAMETERS, *SIZE_PX, covariance=covariance),
-        TARGET,
+        target,
         tuple(views),
         Truth(X, Y),
         "simulated",
@@ -139,7 +147,7 @@ def _level(random: np.random.Generator, bounds: tuple[float, float]) -> float:
     return low * (high / low) ** random.uniform()
 
 
-def _in_camera(T_camera_target: FloatArray, target: Target = TARGET) -> FloatArray:
+def _in_camera(T_camera_target: FloatArray, target: Target) -> FloatArray:
     return target.points @ T_camera_target[:3, :3].T + T_camera_target[:3, 3]
 
 
@@ -182,10 +190,10 @@ def _camera_pose(random: np.random.Generator, camera: Camera, options: CellOptio
     fx, fy, cx, cy = camera.parameters[:4]
     # The board's centre in the inner part of the image: elsewhere it would rarely be seen whole.
     u, v = random.uniform([0.2, 0.2], [0.8, 0.8]) * SIZE_PX
-    centre = TARGET.points.mean(axis=0)
+    centre = options.target.points.mean(axis=0)
     aim = np.array([(u - cx) / fx, (v - cy) / fy, 1.0]) * distance
     pose[:3, 3] = aim - pose[:3, :3] @ centre
-    pixels, seen = _core.project(camera.lens, camera.parameters, _in_camera(pose))
+    pixels, seen = _core.project(camera.lens, camera.parameters, _in_camera(pose, options.target))
     inside = (pixels >= MARGIN_PX) & (pixels <= np.array(SIZE_PX) - 1 - MARGIN_PX)
     return pose if seen.all() and inside.all() else None
 
@@ -240,7 +248,7 @@ def _calibration_covariance(
         pose = _camera_pose(random, camera, options)
         if pose is None:
             continue
-        information += camera_information(camera, TARGET, pose)
+        information += camera_information(camera, options.target, pose)
         count += 1
     return symmetric(np.asarray(np.linalg.inv(information), np.float64) * pixel_sigma**2)
 

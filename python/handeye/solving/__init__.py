@@ -1,7 +1,14 @@
 """From views to X and Y with their uncertainty."""
 
 from handeye.solving.auto import AutoEstimator, AutoOptions
-from handeye.solving.calibrate import calibrate, make_estimator, require_determined, solve, to_calibration
+from handeye.solving.calibrate import (
+    calibrate,
+    calibrate_examined,
+    make_estimator,
+    require_determined,
+    solve,
+    to_calibration,
+)
 from handeye.solving.estimate import Estimate, Estimator, Sight
 from handeye.solving.measurements import Measurements, ViewPose, view_pose
 from handeye.solving.paper import paper_estimate
@@ -15,6 +22,7 @@ __all__ = [
     "Sight",
     "ViewPose",
     "calibrate",
+    "calibrate_examined",
     "make_estimator",
     "paper_estimate",
     "require_determined",

@@ -10,6 +10,7 @@ from handeye.solving.blame import blame
 from handeye.solving.estimate import Estimate, Estimator, regular_information
 from handeye.solving.initialize import check_views
 from handeye.solving.measurements import Measurements
+from handeye.solving.mistakes import Examination, examine
 from handeye.solving.paper import paper_estimate
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName, ViewResult
@@ -33,6 +34,8 @@ def solve(
 ) -> Calibration:
     """Calibrate from all usable views of a recording.
 
+    Views with a mistake are put right or left out, and named in `diagnosis`; see `docs/mistakes.md`.
+
     Parameters
     ----------
     recording
@@ -49,7 +52,9 @@ def solve(
     Raises
     ------
     InputError
-        Fewer than three usable views, or views without the joint positions that the arm needs.
+        Fewer than three usable views, or views without the joint positions that the arm needs. A mistake that
+        all views share (a wrong direction, unit or order of numbers, images filed with the wrong poses); the
+        code names it.
     DegenerateError
         The views do not determine the answer, and it was not asked for reduced; the message names what they
         leave open, the hint how to cure it.
@@ -69,10 +74,23 @@ def calibrate(
 ) -> Calibration:
     """Calibrate from measurements; see `solve`."""
     check_views(measurements)
+    return calibrate_examined(examine(measurements), model, reduced=reduced, kinematics=kinematics)
+
+
+def calibrate_examined(
+    examination: Examination,
+    model: ModelName = ModelName.AUTO,
+    *,
+    reduced: bool = False,
+    kinematics: Kinematics | None = None,
+) -> Calibration:
+    """Calibrate from measurements whose mistakes have been looked for; see `solve`."""
+    measurements = examination.measurements
+    check_views(measurements)
     estimate = make_estimator(model, kinematics)(measurements)
     if not reduced:
         require_determined(estimate)
-    calibration = to_calibration(measurements, estimate)
+    calibration = examination.told(to_calibration(measurements, estimate))
     if calibration.model is ModelName.PAPER or not estimate.determined:
         return calibration
     return replace(calibration, diagnosis=(*calibration.diagnosis, blame(measurements, estimate)))
