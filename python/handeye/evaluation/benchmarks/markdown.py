@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 ABOUT = (
-    "Written by `handeye bench`. Wall-clock times of calls from Python on one core, medians with quartiles; "
+    "Written by `handeye bench`. Processor times of calls from Python on one core, medians with quartiles; "
     "methods take turns in one run, so that ratios hold where the machine is busy with other things too."
 )
 
@@ -119,7 +119,7 @@ def _scaling(found: Mapping[str, Any]) -> list[str]:
         "## Growth of cost",
         "Fastest times in microseconds; the exponent is the slope in logarithms.",
         _table(["against", "at", "sizes", "times", "exponent"], rows),
-        f"{offered}, times as fast by number of threads: {speed}.",
+        f"{offered}, times as fast by the clock for each number of threads: {speed}.",
     ]
 
 
