@@ -170,3 +170,25 @@ def test_sets_without_truth_make_no_table1(tmp_path: Path, capsys: pytest.Captur
     code, document = study(capsys, "table1", "--data", tmp_path, "--sets", "real", "--no-cache")
     assert code == 3
     assert document["error"]["code"] == "no_truth"
+
+
+def test_mistakes_have_the_promised_keys(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    arguments = ("mistakes", "--trials", "1", "--kinds", "flip", "moving", "--output", tmp_path)
+    code, document = study(capsys, *arguments)
+    assert code == 0
+    assert list(document["kinds"]) == ["flip", "moving"]
+    assert document["planted"]["trials"] == 2
+    assert document["clean"] == {"trials": 1, "false_alarms": 0.0}
+    for found in document["kinds"].values():
+        assert (found["named"], found["answered"]) == (1.0, 1.0)
+        assert found["translation_ratio"] > 0
+    assert json.loads((tmp_path / "mistakes.json").read_text()) == document
+    assert run(["study", "mistakes", "--trials", "1", "--kinds", "flip", "--workers", "1"]) == 0
+    assert "false alarms: 0.0 % of 1 recordings" in capsys.readouterr().out
+
+
+def test_an_unknown_mistake_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    code, document = study(capsys, "mistakes", "--kinds", "upside_down")
+    assert code == 3
+    assert document["error"]["code"] == "unknown_kind"
+    assert "gross_pose" in document["error"]["hint"]

@@ -144,6 +144,11 @@ def test_studies(handeye: Handeye, study: str) -> None:
     compare(f"handeye study {study}", handeye.json("study", study, *arguments, *options))
 
 
+def test_mistakes(handeye: Handeye) -> None:
+    arguments = ("--trials", "1", "--workers", "1", "--kinds", "flip", "wrong_unit")
+    compare("handeye study mistakes", handeye.json("study", "mistakes", *arguments))
+
+
 def test_coverage(handeye: Handeye) -> None:
     data = handeye.json("study", "coverage", "--trials", "1", "--workers", "1")
     compare("handeye study coverage", data)

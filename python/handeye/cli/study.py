@@ -353,6 +353,54 @@ def coverage(
     return Answer(document, show)
 
 
+@study.command
+def mistakes(
+    *,
+    kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = (),
+    trials: Trials = Trials(),
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Plant one mistake each in simulated recordings, and count how many are named, and what they cost.
+
+    A mistake is named if it is all that is said, with exactly the views that it concerns. As many recordings
+    without a mistake count the false alarms.
+
+    Parameters
+    ----------
+    kinds
+        Mistakes to plant, if not all: flip, swap, shift, moving, gross_pose, wrong_unit, wrong_direction.
+    """
+    from handeye.evaluation.studies import Mistake, study_mistakes  # noqa: PLC0415
+
+    known = [kind.value for kind in Mistake]
+    unknown = [kind for kind in kinds if kind not in known]
+    if unknown:
+        raise InputError(
+            f"no mistake {unknown[0]!r}", code="unknown_kind", hint=f"there are {', '.join(known)}"
+        )
+    _check_folder(trials.output)
+    with progress("Calibrating simulated cells") as advance:
+        result = study_mistakes(
+            kinds=[Mistake(kind) for kind in kinds or known],
+            model=trials.model,
+            trials=trials.count(50),
+            seed=trials.seed,
+            workers=trials.processes,
+            progress=advance,
+        )
+    document = result.to_dict()
+    written = _write(trials.output, "mistakes", document, lambda: ())
+
+    def show(console: "Console") -> None:
+        from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
+
+        tables.show_title(console, "One mistake in each simulated recording", document)
+        tables.show_mistakes(console, document)
+        tables.show_written(console, written)
+
+    return Answer(document, show)
+
+
 def _check_folder(path: Path | None) -> None:
     """Refuse a folder that cannot be made, before the work rather than after it."""
     if path is None:

@@ -97,3 +97,26 @@ def show_kinds(console: Console, kinds: Mapping[str, Mapping[str, Any]]) -> None
             str(found["trials"]),
         )
     console.print(table)
+
+
+def show_mistakes(console: Console, document: Mapping[str, Any]) -> None:
+    """Print how many of each mistake were named, and the error against that without the mistake."""
+    table = _table("mistake")
+    for title in ("named", "answered", "error (mm)", "without it", "trials"):
+        table.add_column(title, justify="right")
+    for kind, found in [*document["kinds"].items(), ("all", document["planted"])]:
+        table.add_row(
+            kind.replace("_", " "),
+            f"{100 * found['named']:.1f} %",
+            f"{100 * found['answered']:.1f} %",
+            *(
+                "-" if found[key] is None else f"{found[key]:.3f}"
+                for key in ("translation_mm", "clean_translation_mm")
+            ),
+            str(found["trials"]),
+        )
+    console.print(table)
+    clean = document["clean"]
+    console.print(
+        f"false alarms: {100 * clean['false_alarms']:.1f} % of {clean['trials']} recordings without a mistake"
+    )

@@ -4,7 +4,7 @@ from handeye.evaluation.studies.coverage import Coverage, study_coverage
 from handeye.evaluation.studies.curves import Curves, study_curves
 from handeye.evaluation.studies.holdout import Holdout, study_holdout
 from handeye.evaluation.studies.injected import Injected, study_injected
-from handeye.evaluation.studies.mistakes import Mistakes, study_mistakes
+from handeye.evaluation.studies.mistakes import Mistake, Mistakes, study_mistakes
 from handeye.evaluation.studies.table1 import Table1, study_table1
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "Curves",
     "Holdout",
     "Injected",
+    "Mistake",
     "Mistakes",
     "Table1",
     "study_coverage",
