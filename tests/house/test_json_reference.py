@@ -149,6 +149,11 @@ def test_mistakes(handeye: Handeye) -> None:
     compare("handeye study mistakes", handeye.json("study", "mistakes", *arguments))
 
 
+def test_twin(handeye: Handeye) -> None:
+    options = ("--sets", "1", "--trials", "1", "--models", "paper", "auto", "--workers", "1")
+    compare("handeye study twin", handeye.json("study", "twin", *options))
+
+
 def test_coverage(handeye: Handeye) -> None:
     data = handeye.json("study", "coverage", "--trials", "1", "--workers", "1")
     compare("handeye study coverage", data)

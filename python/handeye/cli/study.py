@@ -28,6 +28,10 @@ study = App(
     "found in their images is remembered in the user's cache folder (HANDEYE_CACHE names another).",
     result_action="return_value",
 )
+# Imported when it runs.
+study.command(
+    "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
+)
 
 
 @Parameter(name="*", group="Study")

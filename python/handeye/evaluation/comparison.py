@@ -8,13 +8,14 @@ import numpy as np
 
 from handeye import _core
 from handeye.evaluation import metrics
-from handeye.evaluation.parallel import Progress, run_all
+from handeye.evaluation.parallel import Progress, Workers, run_all
 from handeye.evaluation.protocol import Protocol, Trial, draw_trials
 from handeye.planning import NumberOfViews, Planner, PlannerOptions, Pool, Proposal, make_policy
 from handeye.solving import Estimate, Estimator, Measurements, Sight, make_estimator
 from handeye.types import Pose, Recording
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
+from handeye.types.kinematics import Kinematics
 
 # The paper's three, in the order of its table I.
 POLICIES = ("next_best_view", "random", "max_distance")
@@ -122,6 +123,8 @@ class Comparison:
         Criterion that gains are measured in.
     scatter
         Whether every candidate of the first step is tried, for the scatter of predicted and realised gain.
+    kinematics
+        The arm, if it is known; every view must then have joint positions.
     """
 
     protocol: Protocol = field(default_factory=Protocol)
@@ -129,6 +132,7 @@ class Comparison:
     policies: tuple[str, ...] = POLICIES
     criterion: str = "entropy"
     scatter: bool = False
+    kinematics: Kinematics | None = None
 
 
 @dataclass(frozen=True)
@@ -143,7 +147,7 @@ def compare(
     recordings: Sequence[Recording],
     comparison: Comparison,
     *,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
     prepare: Callable[[Measurements, Trial], Measurements] | None = None,
 ) -> list[SetResult]:
@@ -207,7 +211,7 @@ def run_trial(
     measurements: Measurements, trial: Trial, comparison: Comparison, X_true: Pose | None
 ) -> TrialResult:
     """Run one start under every policy; all begin with the same estimate."""
-    estimator = make_estimator(comparison.model)
+    estimator = make_estimator(comparison.model, comparison.kinematics)
     held_out = measurements.select(trial.held_out)
     steps = {
         policy: tuple(
