@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
 
+    from handeye.evaluation.parallel import Workers
     from handeye.types import Recording
 
 study = App(
@@ -47,6 +48,10 @@ class Trials:
     """Seed of everything random."""
     workers: Annotated[int | None, Parameter(show_default=False)] = None
     """Processes; all processors by default. The results do not depend on it."""
+    scheduler: Annotated[str | None, Parameter(show_default=False)] = None
+    """Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786."""
+    checkpoint: Path | None = None
+    """Folder that keeps finished pieces: the same command goes on where it was broken off."""
     output: Path | None = None
     """Folder for the pictures and the JSON object; made if it does not exist."""
 
@@ -72,6 +77,20 @@ class Trials:
 
         count: int = cpu_count()
         return count
+
+    @property
+    def crew(self) -> "Workers":
+        """Who does the work, and what keeps it."""
+        workers: Workers = self.processes
+        if self.scheduler is not None:
+            from handeye.evaluation.cluster import Cluster  # noqa: PLC0415 - rarely wanted
+
+            workers = Cluster(self.scheduler)
+        if self.checkpoint is not None:
+            from handeye.evaluation.checkpoint import Checkpoint  # noqa: PLC0415 - rarely wanted
+
+            workers = Checkpoint(self.checkpoint, workers)
+        return workers
 
 
 @Parameter(name="*", group="Data")
@@ -132,7 +151,7 @@ def table1(
             model=trials.model,
             trials=count,
             seed=trials.seed,
-            workers=trials.processes,
+            workers=trials.crew,
             progress=advance,
         )
 
@@ -181,7 +200,7 @@ def curves(
             model=trials.model,
             trials=count,
             seed=trials.seed,
-            workers=trials.processes,
+            workers=trials.crew,
             progress=advance,
         )
 
@@ -234,7 +253,7 @@ def holdout(
             model=trials.model,
             trials=count,
             seed=trials.seed,
-            workers=trials.processes,
+            workers=trials.crew,
             progress=advance,
         )
 
@@ -287,7 +306,7 @@ def injected(
             model=trials.model,
             trials=count,
             seed=trials.seed,
-            workers=trials.processes,
+            workers=trials.crew,
             progress=advance,
         )
     document = result.to_dict()
@@ -335,7 +354,7 @@ def coverage(
             cell=CellOptions(mounting=mounting),
             trials=trials.count(500),
             seed=trials.seed,
-            workers=trials.processes,
+            workers=trials.crew,
             progress=advance,
         )
 
@@ -389,7 +408,7 @@ def mistakes(
             model=trials.model,
             trials=trials.count(50),
             seed=trials.seed,
-            workers=trials.processes,
+            workers=trials.crew,
             progress=advance,
         )
     document = result.to_dict()

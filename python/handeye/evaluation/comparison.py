@@ -8,7 +8,7 @@ import numpy as np
 
 from handeye import _core
 from handeye.evaluation import metrics
-from handeye.evaluation.parallel import Progress, run_all
+from handeye.evaluation.parallel import Progress, Workers, run_all
 from handeye.evaluation.protocol import Protocol, Trial, draw_trials
 from handeye.planning import NumberOfViews, Planner, PlannerOptions, Pool, Proposal, make_policy
 from handeye.solving import Estimate, Estimator, Measurements, Sight, make_estimator
@@ -147,7 +147,7 @@ def compare(
     recordings: Sequence[Recording],
     comparison: Comparison,
     *,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
     prepare: Callable[[Measurements, Trial], Measurements] | None = None,
 ) -> list[SetResult]:

@@ -1,9 +1,9 @@
 """Many independent pieces of work on several processes, with the same results however many there are."""
 
 import warnings
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from joblib import Parallel, delayed, parallel_config  # pyright: ignore[reportUnknownVariableType]
 
@@ -16,13 +16,29 @@ Progress = Callable[[int, int], None]
 """Is told how many pieces are done, of how many."""
 
 
+class Executor(Protocol):
+    """Something that works pieces off, here or elsewhere."""
+
+    def run(self, work: Callable[[T], R], pieces: Sequence[T]) -> Generator[tuple[int, R]]:
+        """Yield the index and the result of each piece, in the order in which they finish."""
+        ...
+
+
+Workers = int | Executor
+"""A number of processes of this machine (1: this one), or whoever else does the work."""
+
+
 def run_all(
-    work: Callable[[T], R], pieces: Sequence[T], *, workers: int = 1, progress: Progress | None = None
+    work: Callable[[T], R],
+    pieces: Sequence[T],
+    *,
+    workers: Workers = 1,
+    progress: Progress | None = None,
 ) -> list[R]:
     """Return the results of all pieces, in their order.
 
     Each piece must carry its own seed: then the results are the same to the last bit whatever the number of
-    processes. Ctrl-C ends the processes too.
+    processes and wherever they are. Ctrl-C ends the processes too.
 
     Parameters
     ----------
@@ -31,7 +47,7 @@ def run_all(
     pieces
         What to call it with; enough pieces of equal size keep all processes busy.
     workers
-        Number of processes; 1 works in this one.
+        Number of processes, or whoever else does the work.
     progress
         Told how many pieces are done, of how many; first with none done.
 
@@ -40,10 +56,42 @@ def run_all(
     InputError
         Fewer than one process.
     """
+    told = progress or _nothing
+    results: dict[int, R] = {}
+    told(0, len(pieces))
+    finished = run_each(work, pieces, workers)
+    try:
+        for index, result in finished:
+            results[index] = result
+            told(len(results), len(pieces))
+    finally:
+        finished.close()
+    return [results[index] for index in range(len(pieces))]
+
+
+def run_each(work: Callable[[T], R], pieces: Sequence[T], workers: Workers) -> Generator[tuple[int, R]]:
+    """Yield the index and the result of each piece as it is finished.
+
+    Raises
+    ------
+    InputError
+        Fewer than one process.
+    """
+    if not isinstance(workers, int):
+        return workers.run(work, pieces)
     if workers < 1:
         raise InputError(f"{workers} workers, expected at least 1", code="out_of_range")
     if workers == 1 or len(pieces) < 2:
-        return _gather((work(piece) for piece in pieces), len(pieces), progress)
+        return _here(work, pieces)
+    return _processes(work, pieces, workers)
+
+
+def _here(work: Callable[[T], R], pieces: Sequence[T]) -> Generator[tuple[int, R]]:
+    for index, piece in enumerate(pieces):
+        yield index, work(piece)
+
+
+def _processes(work: Callable[[T], R], pieces: Sequence[T], workers: int) -> Generator[tuple[int, R]]:
     # Threads inside the processes would only compete.
     with parallel_config(backend="loky", inner_max_num_threads=1):
         # One piece at a time: the slowest process holds up the others by one piece at most.
@@ -51,7 +99,7 @@ def run_all(
         pool: Any = Parallel(n_jobs=min(workers, len(pieces)), batch_size=one, return_as="generator")
         results: Generator[R] = pool(delayed(work)(piece) for piece in pieces)
         with _left_without_a_word(results):
-            return _gather(results, len(pieces), progress)
+            yield from enumerate(results)
 
 
 @contextmanager
@@ -63,16 +111,6 @@ def _left_without_a_word(results: Generator[R]) -> Generator[None]:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=".*tasks ", category=UserWarning, module="joblib")
             results.close()
-
-
-def _gather(results: Iterable[R], total: int, progress: Progress | None) -> list[R]:
-    told = progress or _nothing
-    gathered: list[R] = []
-    told(0, total)
-    for result in results:
-        gathered.append(result)
-        told(len(gathered), total)
-    return gathered
 
 
 def _nothing(done: int, total: int) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from handeye.evaluation import metrics
-from handeye.evaluation.parallel import Progress, run_all
+from handeye.evaluation.parallel import Progress, Workers, run_all
 from handeye.evaluation.protocol import true_hand_eye
 from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate, simulated_arm
 from handeye.robots import ArmKinematics
@@ -104,7 +104,7 @@ def study_coverage(
     cell: CellOptions | None = None,
     trials: int = 500,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Coverage:
     """Calibrate `trials` made-up cells for each kind of error.

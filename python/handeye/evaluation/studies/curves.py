@@ -14,7 +14,7 @@ from handeye.evaluation.comparison import (
     SetResult,
     compare,
 )
-from handeye.evaluation.parallel import Progress
+from handeye.evaluation.parallel import Progress, Workers
 from handeye.evaluation.protocol import Protocol
 from handeye.types import Recording
 from handeye.types.arrays import FloatArray
@@ -89,7 +89,7 @@ def study_curves(
     model: ModelName = ModelName.AUTO,
     trials: int = 50,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Curves:
     """Run 3 + 5 views with a third held out, and try every candidate of the first step.

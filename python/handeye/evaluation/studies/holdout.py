@@ -8,7 +8,7 @@ import numpy as np
 
 from handeye.evaluation import metrics
 from handeye.evaluation.comparison import POLICIES, Comparison, SetResult, compare, piece_count, summary
-from handeye.evaluation.parallel import Progress, part_of, run_all
+from handeye.evaluation.parallel import Progress, Workers, part_of, run_all
 from handeye.evaluation.protocol import Protocol, contiguous_halves, random_halves
 from handeye.solving import Measurements, make_estimator
 from handeye.types import Recording
@@ -95,7 +95,7 @@ def study_holdout(
     model: ModelName = ModelName.AUTO,
     trials: int = 50,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Holdout:
     """Run 3 + 5 views with a third held out, and as many random halvings of all views.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from handeye.evaluation.comparison import POLICIES, Comparison, SetResult, compare, piece_count, summary
-from handeye.evaluation.parallel import Progress, part_of
+from handeye.evaluation.parallel import Progress, Workers, part_of
 from handeye.evaluation.protocol import Protocol, Trial, true_hand_eye
 from handeye.solving import Measurements
 from handeye.types import Pose, Recording, View
@@ -89,7 +89,7 @@ def study_injected(
     model: ModelName = ModelName.AUTO,
     trials: int = 50,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Injected:
     """Run the protocol of table I with noise added to the robot's poses, drawn anew for each trial.

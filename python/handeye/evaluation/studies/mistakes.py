@@ -15,7 +15,7 @@ import numpy as np
 
 from handeye.errors import InputError
 from handeye.evaluation import metrics
-from handeye.evaluation.parallel import Progress, run_all
+from handeye.evaluation.parallel import Progress, Workers, run_all
 from handeye.evaluation.protocol import true_hand_eye
 from handeye.evaluation.simulate import TARGET, CellOptions, ErrorKind, simulate
 from handeye.solving import solve
@@ -132,7 +132,7 @@ def study_mistakes(
     model: ModelName = ModelName.AUTO,
     trials: int = 50,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Mistakes:
     """Plant each mistake in `trials` made-up recordings, and none in as many.

@@ -12,7 +12,7 @@ from handeye.evaluation.comparison import (
     pooled,
     summary,
 )
-from handeye.evaluation.parallel import Progress
+from handeye.evaluation.parallel import Progress, Workers
 from handeye.evaluation.protocol import Protocol, true_hand_eye
 from handeye.types import Recording
 from handeye.types.arrays import FloatArray
@@ -63,7 +63,7 @@ def study_table1(
     model: ModelName = ModelName.AUTO,
     trials: int = 50,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Table1:
     """Run the protocol of the paper's table I: 3 random views, then 5 chosen by each policy.
