@@ -12,6 +12,7 @@ import json
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -105,8 +106,9 @@ def main() -> int:
         "--cells", type=int, default=24, help="number of cells of each kind, or of fault runs"
     )
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=MODELLED)
+    parser.add_argument("--faults", action="store_true", help="runs with faults")
     parser.add_argument(
-        "--faults", action="store_true", help="runs with faults, each beside an undisturbed one"
+        "--beside", type=int, default=40, help="fault runs that have an undisturbed one beside"
     )
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
     parser.add_argument("--output", type=Path, required=True)
@@ -125,9 +127,10 @@ def main() -> int:
                 line: dict[str, Any] = {"kind": kind, "number": number}
                 if kind == "faults":
                     fault, configuration = disturbed(number)
-                    calm = replace(configuration, simulation=replace(configuration.simulation, faults=None))
-                    undisturbed = run(calm)
-                    line |= {"fault": fault, "undisturbed": undisturbed} | run(configuration)
+                    line |= {"fault": fault} | run(configuration)
+                    if number < options.beside:
+                        calm = replace(configuration.simulation, faults=None)
+                        line["undisturbed"] = run(replace(configuration, simulation=calm))
                 else:
                     line |= run(cell(kind, number))
                 file.write(json.dumps(line) + "\n")
@@ -157,20 +160,11 @@ def _sum_up(lines: list[dict[str, Any]]) -> None:
             f"{failed} failed attempts, longest {max(e['seconds'] for e in some):.0f} s"
         )
         if kind == "faults":
-            both = [line for line in some if "mm" in line and "mm" in line["undisturbed"]]
-            mean, calm = (
-                np.mean([line["mm"] for line in part]) for part in (both, [b["undisturbed"] for b in both])
-            )
-            print(f"  mean error {mean:.3f} mm, undisturbed {calm:.3f} mm; other ends: ", end="")
-            print(
-                dict(
-                    zip(
-                        *np.unique([e["end"] for e in some if e["end"] != reached], return_counts=True),
-                        strict=True,
-                    )
-                )
-            )
-            print("  undisturbed inside:", sum(_inside(line["undisturbed"]) for line in some))
+            calm = [line["undisturbed"] for line in some if "mm" in line.get("undisturbed", {})]
+            mean, beside = (np.mean([line["mm"] for line in part]) for part in (ended, calm))
+            others = Counter(line["end"] for line in some if line["end"] != reached)
+            print(f"  mean error {mean:.3f} mm; of {len(calm)} undisturbed {beside:.3f} mm,", end=" ")
+            print(f"{sum(map(_inside, calm))} of these inside; other ends: {dict(others)}")
         for line in ended:
             if not _inside(line):
                 print(
