@@ -412,3 +412,4 @@ def _show(console: "Console", data: Mapping[str, Any], end: End, error: Mapping[
         rows.append(("report", data["report"]))
     pairs(console, rows)
     notices(console, "Warnings", calibration.warnings)
+    notices(console, "Diagnosis", (finding.sentence for finding in calibration.diagnosis), "cyan")

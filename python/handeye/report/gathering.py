@@ -18,7 +18,8 @@ from handeye.report.recipe import recipe
 from handeye.report.regions import USUAL_DISTANCES_M, at_points, position_axes, rotation_axes, within
 from handeye.report.solved import Solved
 from handeye.report.views import ViewPicture, view_lines, view_picture
-from handeye.solving import Measurements, calibrate
+from handeye.solving import Measurements, calibrate_examined
+from handeye.solving.mistakes import examine
 from handeye.types import Camera, Mounting, Pose, Recording, Target
 from handeye.types.calibration import MM_PER_M, Calibration, ModelName
 from handeye.types.plain import read_document
@@ -87,7 +88,9 @@ def gather_recording(
     recording = opened.recording
     measurements = Measurements.of_recording(recording)
     kinematics = arm_of(opened.folder, recording, model)
-    calibration = calibrate(measurements, model, reduced=reduced, kinematics=kinematics)
+    examination = examine(measurements)
+    calibration = calibrate_examined(examination, model, reduced=reduced, kinematics=kinematics)
+    measurements = examination.among(measurements)
     warnings = [str(warning) for warning in opened.warnings]
     solved = read_document(
         calibration.to_dict() | {"camera_origin": opened.camera_origin.value, "source": recording.source},

@@ -26,12 +26,15 @@ from handeye.session.judging import labeled, objection
 from handeye.session.request import Reach, Requested, reach
 from handeye.session.starting import Start, starting_goal
 from handeye.session.store import SessionStore
-from handeye.solving import Estimate, Estimator, Measurements, calibrate, make_estimator, view_pose
+from handeye.solving import Estimate, Estimator, Measurements, calibrate_examined, make_estimator, view_pose
+from handeye.solving.mistakes import examine
 from handeye.types import Pose, View
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName
 
 START_VIEWS = 3
+# Fewer views than these cannot speak against one of them.
+FEWEST_EXAMINED = 5
 _WRITE_PAUSE_S = 0.2
 
 
@@ -43,6 +46,10 @@ class EndReason(StrEnum):
     NO_CANDIDATE = "no_candidate"
     NO_START = "no_start"
     TOO_MANY_FAILURES = "too_many_failures"
+
+
+# Ends without an answer.
+FAILED = (EndReason.NO_START, EndReason.TOO_MANY_FAILURES)
 
 
 @dataclass(frozen=True)
@@ -190,7 +197,9 @@ class Session:
                 EndReason.TOO_MANY_FAILURES,
                 f"{len(missed)} attempts in a row brought no view; the last: {last.failure}: {last.detail}",
             )
-        measurements = self._with(views)
+        measurements = _without_mistakes(self._with(views))
+        if len(measurements) < len(views) and len(views) >= self._wish.most_views:
+            return self._end(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
         estimate = self._estimator(measurements) if len(measurements) >= START_VIEWS else None
         again = self._same_place(missed, estimate)
         if again is not None:
@@ -433,9 +442,16 @@ class Session:
         calibration, radii = None, None
         measurements = self._with(views)
         if len(measurements) >= START_VIEWS:
-            estimate = self._estimator(measurements)
+            try:
+                examination = examine(measurements)
+            except InputError as error:
+                if reason not in FAILED:
+                    raise
+                # What all views share may well be why nothing came of the attempts.
+                return End(reason, f"{sentence}; {error.message}", None, None, len(views), len(entries))
+            estimate = self._estimator(examination.measurements)
             if estimate.determined:
-                calibration = calibrate(measurements, self._wish.model, kinematics=self._kinematics)
+                calibration = calibrate_examined(examination, self._wish.model, kinematics=self._kinematics)
                 radii = reach(estimate)
         return End(reason, sentence, calibration, radii, len(views), len(entries))
 
@@ -448,6 +464,16 @@ def _failures_at_end(entries: tuple[Entry, ...]) -> list[Entry]:
             break
         missed.append(entry)
     return missed[::-1]
+
+
+def _without_mistakes(measurements: Measurements) -> Measurements:
+    """Return what is left to plan from: one wrong view would make all the others look uncertain."""
+    if len(measurements) < FEWEST_EXAMINED:
+        return measurements
+    try:
+        return examine(measurements).measurements
+    except InputError:
+        return measurements  # Shared by all of them; said at the end.
 
 
 def _known(estimate: Estimate) -> Estimator:

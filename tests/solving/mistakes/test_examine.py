@@ -65,6 +65,19 @@ def shifted(recording: Recording, first: int, length: int) -> Recording:
     return recording.with_views(views)
 
 
+def test_views_are_shown_as_they_are_used() -> None:
+    clean = made_up(5, 3)
+    recording, flipped = plant(clean, Mistake.FLIP, np.random.default_rng(0))
+    recording, wrong = plant(recording, Mistake.GROSS_POSE, np.random.default_rng(3))
+    assert wrong != flipped
+    given = Measurements.of_recording(recording)
+    shown = examine(given).among(given)
+    assert [view.name for view in shown.views] == [view.name for view in clean.views]
+    for view, before, right in zip(shown.views, given.views, clean.views, strict=True):
+        assert (view == before) == (view.name not in flipped)
+        np.testing.assert_array_equal(view.point_ids, right.point_ids)
+
+
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_shifted_list_of_images_is_refused(number: int) -> None:
     clean = made_up(number, 3)

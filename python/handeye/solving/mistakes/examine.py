@@ -38,6 +38,17 @@ class Examination:
     findings: tuple[Finding, ...] = ()
     notes: dict[str, str] = field(default_factory=dict[str, str])
 
+    def among(self, given: Measurements) -> Measurements:
+        """Return the given measurements with the views that are left as they are used."""
+        kept = {
+            view.name: (view, pose)
+            for view, pose in zip(self.measurements.views, self.measurements.poses, strict=True)
+        }
+        both = [
+            kept.get(view.name, (view, pose)) for view, pose in zip(given.views, given.poses, strict=True)
+        ]
+        return replace(given, views=tuple(view for view, _ in both), poses=tuple(pose for _, pose in both))
+
     def told(self, calibration: Calibration) -> Calibration:
         """Return a calibration of the measurements that says what was found."""
         views = tuple(
