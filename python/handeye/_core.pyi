@@ -96,6 +96,7 @@ def fit_corners(
     bands: ArrayLike,
     is_crossing: bool,
     smoothing_px: float,
+    passes: int,
 ) -> NDArray[float64]:
     """Corners (N, 2) fitted to grey values; NaN where there is none near the guess.
 
@@ -103,7 +104,7 @@ def fit_corners(
     guesses, `directions` (N, 2, 2) those of the two edges, `curvatures` (N, 2) theirs in 1 / px towards the
     normals (-sin, cos); `radii` (N,) are free of other edges and `bands` (N,) the distances from the edges,
     in pixels, beyond which there is something else. At a crossing diagonal parts are equal and the light may
-    change; else the four parts may be of any grey.
+    change; else the four parts may be of any grey. After each of several passes the window is laid anew.
     """
 
 def area_centroids(

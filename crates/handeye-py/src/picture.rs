@@ -47,6 +47,7 @@ fn fit_corners<'py>(
     bands: Array<'py>,
     is_crossing: bool,
     smoothing_px: f64,
+    passes: usize,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let places = convert::vectors::<2>(py, "places", &places)?;
     let directions = convert::matrices::<2, 2>(py, "directions", &directions)?;
@@ -66,7 +67,9 @@ fn fit_corners<'py>(
     });
     let found = py.detach(|| {
         guesses
-            .flat_map(|guess| fit_corner(&picture, &guess, kind, smoothing_px).unwrap_or([f64::NAN; 2]))
+            .flat_map(|guess| {
+                fit_corner(&picture, &guess, kind, smoothing_px, passes).unwrap_or([f64::NAN; 2])
+            })
             .collect()
     });
     Ok(convert::array(py, &[n, 2], found))

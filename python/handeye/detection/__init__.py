@@ -4,6 +4,7 @@ from handeye.detection.base import Detection, Image, NotFound, Reason, relabeled
 from handeye.detection.batch import Batch, DetectionCache, detect_all
 from handeye.detection.detect import detect
 from handeye.detection.intrinsics import CameraCalibration, calibrate_camera
+from handeye.detection.predicted import Prediction
 
 __all__ = [
     "Batch",
@@ -12,6 +13,7 @@ __all__ = [
     "DetectionCache",
     "Image",
     "NotFound",
+    "Prediction",
     "Reason",
     "calibrate_camera",
     "detect",

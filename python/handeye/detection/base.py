@@ -105,6 +105,10 @@ class NotFound:
         return DetectionError(f"{name}: target not found: {self.evidence}", code=self.reason, hint=self.hint)
 
 
+# Where only a part of the image was looked at, nobody asks why.
+NOT_HERE = NotFound(Reason.NO_PATTERN, "not in this part of the image")
+
+
 def relabeled(detection: Detection, permutation: IndexArray) -> Detection:
     """Return the detection with point i called `permutation[i]`, as the symmetries of a target have it."""
     return Detection(permutation[detection.point_ids], detection.pixels)

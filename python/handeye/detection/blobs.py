@@ -4,12 +4,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from handeye.detection.base import Image
 from handeye.types.arrays import FloatArray, IndexArray
 
 LEVELS = 12
 SMALLEST_AREA_PX = 12.0
+FEWEST_EDGE_PX = 8
 # Largest share of the image that one circle may cover.
 LARGEST_SHARE = 0.1
 # Area over that of the ellipse with the same second moments: 1 for an ellipse, 0.955 for a rectangle, less
@@ -65,48 +67,41 @@ def find_spots(image: Image) -> tuple[Spots, Spots]:
     """
     smooth = cv2.GaussianBlur(image, (3, 3), 0)
     low, high = (float(v) for v in np.percentile(smooth[::4, ::4], [1, 99]))
-    dark: list[FloatArray] = []
-    light: list[FloatArray] = []
+    rows: list[tuple[float, ...]] = []
     for level in np.linspace(low, high, LEVELS + 2)[1:-1]:
         binary = cv2.threshold(smooth, level, 255, cv2.THRESH_BINARY)[1]
         outlines, hierarchy = cv2.findContours(binary, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
         for index, outline in enumerate(outlines):
-            # In OpenCV's two-level hierarchy an outline with a parent is the edge of a hole: dark in light.
-            is_hole = hierarchy[0, index, 3] >= 0
-            spot = _spot(np.asarray(outline, dtype=np.float64)[:, 0], is_hole, image.size)
-            if spot is not None:
-                (dark if is_hole else light).append(spot)
-    return _merged(dark), _merged(light)
+            if len(outline) >= FEWEST_EDGE_PX:
+                m = cv2.moments(outline)
+                # In OpenCV's two-level hierarchy an outline with a parent is the edge of a hole: dark.
+                is_hole = hierarchy[0, index, 3] >= 0
+                rows.append((m["m00"], m["m10"], m["m01"], m["mu20"], m["mu11"], m["mu02"], is_hole))
+    found, is_dark = _elliptical(np.array(rows, dtype=np.float64).reshape(-1, 7), image.size)
+    return _merged(found[is_dark]), _merged(found[~is_dark])
 
 
-def _spot(outline: FloatArray, is_hole: bool, pixels: int) -> FloatArray | None:
-    """Return centre, shape and roundness (6,) of an outline (N, 2), None if it is no ellipse."""
-    if len(outline) < 8:
-        return None
-    moments = cv2.moments(outline.astype(np.float32)[:, np.newaxis])
-    area = moments["m00"]
-    if not SMALLEST_AREA_PX <= area <= LARGEST_SHARE * pixels:
-        return None
-    xx, xy, yy = moments["mu20"] / area, moments["mu11"] / area, moments["mu02"] / area
+def _elliptical(moments: FloatArray, pixels: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return centre, shape and roundness (N, 6) of those outlines that are ellipses, and which are holes."""
+    moments = moments[(moments[:, 0] >= SMALLEST_AREA_PX) & (moments[:, 0] <= LARGEST_SHARE * pixels)]
+    area = moments[:, 0]
+    xx, xy, yy = (moments[:, 3:6] / area[:, np.newaxis]).T
     determinant = xx * yy - xy * xy
-    if determinant <= 0:
-        return None
-    roundness = area / (4 * np.pi * np.sqrt(determinant))
+    flat = determinant <= 0
+    roundness = area / (4 * np.pi * np.sqrt(np.where(flat, np.inf, determinant)))
     mean, spread = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
-    if roundness < ROUNDNESS or mean + spread > LONGEST_AXIS_RATIO**2 * (mean - spread):
-        return None
+    good = ~flat & (roundness >= ROUNDNESS) & (mean + spread <= LONGEST_AXIS_RATIO**2 * (mean - spread))
+    is_hole = moments[:, 6] > 0
     # Outlines run through the middles of the light pixels of an edge: half a pixel outside a dark spot, half
     # a pixel inside a light one.
-    radius = np.sqrt(area / np.pi)
-    grown = (1 + (-0.5 if is_hole else 0.5) / radius) ** 2
-    shape = 4 * grown * np.array([xx, xy, yy])
-    centre = moments["m10"] / area, moments["m01"] / area
-    return np.array([*centre, *shape, min(roundness, 1.0)])
+    grown = (1 + np.where(is_hole, -0.5, 0.5) / np.sqrt(area / np.pi)) ** 2
+    centres = moments[:, 1:3] / area[:, np.newaxis]
+    shapes = (4 * grown)[:, np.newaxis] * np.column_stack([xx, xy, yy])
+    return np.column_stack([centres, shapes, np.minimum(roundness, 1.0)])[good], is_hole[good]
 
 
-def _merged(found: list[FloatArray]) -> Spots:
+def _merged(rows: FloatArray) -> Spots:
     """Take outlines of one spot together; the one of median area stands for it."""
-    rows = np.array(found).reshape(-1, 6)
     rows = rows[np.argsort(-rows[:, 5], kind="stable")]
     radii = np.sqrt(np.sqrt(np.maximum(rows[:, 2] * rows[:, 4] - rows[:, 3] ** 2, 1e-12)))
     free = np.ones(len(rows), dtype=bool)

@@ -10,9 +10,18 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from handeye.detection.base import Detection, Image, NotFound, Reason, is_mirrored, ordered
+from handeye.detection.base import (
+    NOT_HERE,
+    Detection,
+    Image,
+    NotFound,
+    Reason,
+    is_mirrored,
+    ordered,
+)
 from handeye.detection.corner_fit import CornerKind, fit_corners
 from handeye.detection.diagnosis import diagnose
+from handeye.detection.part import Part
 from handeye.types import Chessboard
 from handeye.types.arrays import FloatArray
 
@@ -22,28 +31,31 @@ SEARCH_SIDE_PX = 2000
 WINDOW_SHARE = 0.8
 
 
-def find(image: Image, target: Chessboard) -> Detection | NotFound:
-    """Find all inner corners of a chessboard.
+def find(image: Image, target: Chessboard, part: Part | None = None) -> Detection | NotFound:
+    """Find all inner corners of a chessboard; with a part of the image, by one quick attempt there.
 
     Point 0 is chosen so that the square between the first corners of the first two rows is dark, if the board
     can be turned so: the board stands as it is usually drawn, with a dark square at the upper left. (OpenCV's
     `findChessboardCornersSB` begins at the light one.)
     """
-    coarse = _search(image, target)
+    coarse = _search(image, target) if part is None else _within(part, target)
     if coarse is None:
-        return _explain(image, target)
+        return _explain(image, target) if part is None else NOT_HERE
     corners = _labeled(image, target, coarse)
-    edges = _edges(target, corners)
-    fitted = fit_corners(
-        image,
-        corners,
-        edges.directions,
-        WINDOW_SHARE * edges.heights,
-        CornerKind.CROSSING,
-        edges.curvatures,
-    )
-    # Where glare or a shadow's edge spoils the picture, what the search found is still the corner.
-    corners = np.where(np.isfinite(fitted), fitted, corners)
+    # Twice: what the corners found tell about their edges is better than what those of the search told.
+    for _ in range(2):
+        edges = _edges(target, corners)
+        fitted = fit_corners(
+            image,
+            corners,
+            edges.directions,
+            WINDOW_SHARE * edges.heights,
+            CornerKind.CROSSING,
+            edges.curvatures,
+            passes=1,
+        )
+        # Where glare or a shadow's edge spoils the picture, what the search found is still the corner.
+        corners = np.where(np.isfinite(fitted), fitted, corners)
     return ordered(target, np.arange(target.point_count), corners)
 
 
@@ -51,16 +63,18 @@ def _search(image: Image, target: Chessboard) -> FloatArray | None:
     """Return corners (P, 2) in the order OpenCV gives them, cheap attempts first."""
     longest = max(image.shape)
     if longest > SEARCH_SIDE_PX:
-        scale = SEARCH_SIDE_PX / longest
-        small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-        found = _corners(small, target, 0)
+        found = _within(Part.whole(image, SEARCH_SIDE_PX / longest), target)
         if found is not None:
-            factor = np.array(image.shape[::-1]) / small.shape[::-1]
-            return (found + 0.5) * factor - 0.5
+            return found
     found = _corners(image, target, 0)
     if found is None:
         found = _corners(image, target, cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE)
     return found
+
+
+def _within(part: Part, target: Chessboard) -> FloatArray | None:
+    found = _corners(part.picture, target, 0)
+    return None if found is None else part.places(found)
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,14 @@ Spots are found at several grey levels, joined to a lattice, and the grid is lai
 area centroid of each circle is measured from grey values. The solver predicts area centroids, too.
 """
 
-import cv2
 import numpy as np
 
-from handeye.detection.base import Detection, Image, NotFound, Reason, ordered
+from handeye.detection.base import NOT_HERE, Detection, Image, NotFound, Reason, ordered
 from handeye.detection.blobs import Spots, areas, find_spots
 from handeye.detection.centroid import area_centroids
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.lattice import Placement, grow, placements
+from handeye.detection.part import Part
 from handeye.types import CircleGrid
 from handeye.types.arrays import FloatArray, IndexArray
 
@@ -26,24 +26,23 @@ LEAST_SHARE = 0.8
 LEAST_LINE_SHARE = 0.6
 
 
-def find(image: Image, target: CircleGrid) -> Detection | NotFound:
-    """Find the circles of a grid; a few that are hidden or cut by the image's edge are left out."""
+def find(image: Image, target: CircleGrid, part: Part | None = None) -> Detection | NotFound:
+    """Find the circles of a grid; a few that are hidden or cut by the image's edge are left out.
+
+    With a part of the image, by one quick attempt there.
+    """
     grid = _places(target)
     seen = 0
-    for scale in _scales(image):
-        small = np.asarray(
-            image
-            if scale == 1
-            else cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA),
-            dtype=np.uint8,
-        )
-        placed, spots = _best(small, grid)
+    parts = (Part.whole(image, scale) for scale in _scales(image)) if part is None else [part]
+    for here in parts:
+        placed, spots = _best(here.picture, grid)
         placed = [p for p in placed if p.found == placed[0].found]
         seen = placed[0].found if placed else 0
         if placed and _is_certain(target, placed[0]):
-            factor = np.array(image.shape[::-1]) / small.shape[::-1]
-            full = Spots((spots.centres + 0.5) * factor - 0.5, spots.shapes * np.outer(factor, factor))
+            full = Spots(here.places(spots.centres), here.shapes(spots.centres, spots.shapes))
             return _measured(image, target, full, placed)
+    if part is not None:
+        return NOT_HERE
     if seen > 0.5 * target.point_count:
         return NotFound(Reason.INCOMPLETE, f"{seen} of {target.point_count} circles found")
     return diagnose(

@@ -42,6 +42,7 @@ def fit_corners(
     kind: CornerKind,
     curvatures: FloatArray | None = None,
     bands: FloatArray | None = None,
+    passes: int = 2,
 ) -> FloatArray:
     """Return corners (N, 2), NaN where the fit fails.
 
@@ -60,6 +61,8 @@ def fit_corners(
         edges. None for straight ones.
     bands
         (N,) distance from the edges, in pixels, beyond which there is something else; None for nothing.
+    passes
+        How often; each lays the window where the last one found the corner, so that the guess matters little.
     """
     finite = np.isfinite(corners).all(axis=1)
     if not finite.any():
@@ -78,5 +81,6 @@ def fit_corners(
         np.full(len(corners), BAND_PX) if bands is None else bands,
         kind is CornerKind.CROSSING,
         SMOOTHING_PX,
+        passes,
     )
     return found + low

@@ -8,14 +8,16 @@ import numpy as np
 
 from handeye.detection import april_grid, charuco, chessboard, circle_grid
 from handeye.detection.base import Detection, Image, NotFound, Reason
+from handeye.detection.part import Part
+from handeye.detection.predicted import Prediction, expected_part, is_whole
 from handeye.errors import InputError
 from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid, Target
 
 SMALLEST_SIDE_PX = 24
 # To be raised with every change of what is detected, or where.
-VERSION = 1
+VERSION = 2
 
-_FINDERS: dict[type[Target], Callable[[Image, Any], Detection | NotFound]] = {
+_FINDERS: dict[type[Target], Callable[[Image, Any, Part | None], Detection | NotFound]] = {
     Chessboard: chessboard.find,
     CircleGrid: circle_grid.find,
     Charuco: charuco.find,
@@ -23,8 +25,11 @@ _FINDERS: dict[type[Target], Callable[[Image, Any], Detection | NotFound]] = {
 }
 
 
-def detect(image: Image, target: Target) -> Detection | NotFound:
+def detect(image: Image, target: Target, *, predicted: Prediction | None = None) -> Detection | NotFound:
     """Find the points of a target in a grey image.
+
+    With a prediction the part of the image where the target should be is looked at first, and the whole image
+    only if the target is not there, or may be only in part.
 
     Parameters
     ----------
@@ -32,6 +37,8 @@ def detect(image: Image, target: Target) -> Detection | NotFound:
         (H, W) uint8, as `handeye.datasets.images.read_image` gives it.
     target
         What to look for.
+    predicted
+        Where it should be, if anything is known of that.
 
     Returns
     -------
@@ -42,7 +49,8 @@ def detect(image: Image, target: Target) -> Detection | NotFound:
     Raises
     ------
     InputError
-        Not a grey image of bytes, or a family of targets for which there is no detector.
+        Not a grey image of bytes, a family of targets for which there is no detector, or a prediction for
+        another number of points.
     """
     finder = _FINDERS.get(type(target))
     if finder is None:
@@ -56,8 +64,32 @@ def detect(image: Image, target: Target) -> Detection | NotFound:
     if min(image.shape) < SMALLEST_SIDE_PX:
         height, width = image.shape
         return NotFound(Reason.IMAGE_TOO_SMALL, f"the image has only {width} x {height} pixels")
+    whole = np.ascontiguousarray(image)
+    if predicted is not None:
+        found = _where_predicted(whole, target, predicted, finder)
+        if found is not None:
+            return found
     try:
-        return finder(np.ascontiguousarray(image), target)
+        return finder(whole, target, None)
     except cv2.error as error:
         # OpenCV asserts on some contents; to the caller that is one image without a target, not a crash.
         return NotFound(Reason.DETECTOR_FAILED, f"OpenCV: {str(error).strip()[:200]}")
+
+
+def _where_predicted(
+    image: Image,
+    target: Target,
+    predicted: Prediction,
+    finder: Callable[[Image, Any, Part | None], Detection | NotFound],
+) -> Detection | None:
+    """Return what is found where it is expected, None if the whole image is to be looked at."""
+    part = expected_part(image, target, predicted, SMALLEST_SIDE_PX)
+    if part is None:
+        return None
+    try:
+        found = finder(image, target, part)
+    except cv2.error:
+        return None
+    if isinstance(found, NotFound) or not is_whole(image, part, target, predicted, found):
+        return None
+    return found

@@ -5,7 +5,7 @@ from functools import cache
 import cv2
 import numpy as np
 
-from handeye.detection.base import Image, NotFound, Reason, affine
+from handeye.detection.base import Image, NotFound, Reason
 from handeye.types.arrays import FloatArray, IndexArray
 
 # Smallest perimeter of a marker, as a share of the longer side of the image.
@@ -15,7 +15,7 @@ TOLERANCE = 0.3
 CONSISTENT_SHARE = 0.75
 NEIGHBOURS = 12
 # Corners are weighed anew so many times; those closer than this to where they should be all count the same.
-WEIGHINGS = 8
+WEIGHINGS = 5
 FINEST_PX = 0.05
 # One of each kind; smaller dictionaries are beginnings of these.
 _LARGEST = (
@@ -71,11 +71,12 @@ def disagreement(plane: FloatArray, pixels: FloatArray) -> NotFound | None:
     away = np.linalg.norm(centres[:, np.newaxis] - centres, axis=2)
     np.fill_diagonal(away, np.inf)
     nearest = np.argmin(away, axis=1)
-    agree = 0
-    for index, other in enumerate(nearest):
-        A, b = affine(plane[index], pixels[index])
-        step = float(np.linalg.norm(seen[other] - seen[index]))
-        agree += float(np.linalg.norm(centres[other] @ A + b - seen[other])) < TOLERANCE * step
+    # The affine map of each marker's own corners, least squares.
+    inverse = np.asarray(np.linalg.pinv(plane - centres[:, np.newaxis]), dtype=np.float64)
+    A = inverse @ (pixels - seen[:, np.newaxis])
+    step = (centres[nearest] - centres)[:, np.newaxis] @ A
+    miss = np.linalg.norm(step[:, 0] + seen - seen[nearest], axis=1)
+    agree = int((miss < TOLERANCE * np.linalg.norm(seen[nearest] - seen, axis=1)).sum())
     if agree >= CONSISTENT_SHARE * len(plane):
         return None
     return NotFound(
@@ -119,24 +120,20 @@ def from_neighbours(plane: FloatArray, pixels: FloatArray) -> FloatArray:
     rows[:, 0, :, :3] = rows[:, 1, :, 3:6] = x1
     rows[:, 0, :, 6:] = -u[..., :1] * x
     rows[:, 1, :, 6:] = -u[..., 1:] * x
-    wanted = u.transpose(0, 2, 1)
-    weights = np.ones(x.shape[:2])
-    homography: FloatArray = np.zeros((len(x), 8))
-    floor = FINEST_PX / extent[:, 0, 0, np.newaxis]
+    rows = rows.reshape(len(x), -1, 8)
+    wanted = u.transpose(0, 2, 1).reshape(len(x), -1, 1)
+    weights = np.ones((len(x), x.shape[1]))
+    homography: FloatArray = np.zeros((len(x), 8, 1))
+    floor = FINEST_PX / extent[:, 0]
     for _ in range(WEIGHINGS):
-        weighted = rows * weights[:, np.newaxis, :, np.newaxis]
-        normal = _sum("nkia,nkib->nab", weighted, rows) + 1e-12 * np.eye(8)
-        right = _sum("nkia,nki->na", weighted, wanted)
-        homography = np.asarray(np.linalg.solve(normal, right[..., np.newaxis]), dtype=np.float64)[..., 0]
-        miss = np.linalg.norm(_sum("nkia,na->nki", rows, homography) - wanted, axis=1)
+        weighted = (rows * np.tile(weights, 2)[..., np.newaxis]).transpose(0, 2, 1)
+        normal = weighted @ rows + 1e-12 * np.eye(8)
+        homography = np.asarray(np.linalg.solve(normal, weighted @ wanted), dtype=np.float64)
+        miss = np.hypot(*np.split((rows @ homography - wanted)[..., 0], 2, axis=1))
         weights = 1 / np.maximum(miss, floor)
         weights /= weights.max(axis=1, keepdims=True)
     # Where the origin of the plane comes to lie.
-    return pixels + homography[:, [2, 5]] * extent[:, 0]
-
-
-def _sum(indices: str, *factors: FloatArray) -> FloatArray:
-    return np.asarray(np.einsum(indices, *factors), dtype=np.float64)
+    return pixels + homography[:, [2, 5], 0] * extent[:, 0]
 
 
 def _about(places: FloatArray, middles: FloatArray) -> tuple[FloatArray, FloatArray]:

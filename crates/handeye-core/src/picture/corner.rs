@@ -70,14 +70,17 @@ impl Window {
         for v in -reach..=reach {
             for u in -reach..=reach {
                 let (x, y) = (u as f64 - dx, v as f64 - dy);
-                // A soft rim, so that no pixel leaps in or out as the corner moves.
-                let rim = (radius - x.hypot(y) + 0.5).clamp(0.0, 1.0);
                 let from_edge = guess
                     .directions
                     .iter()
                     .map(|d| (d[0] * y - d[1] * x).abs())
                     .fold(f64::INFINITY, f64::min);
-                let weight = rim * (band - from_edge + 0.5).clamp(0.0, 1.0);
+                let strip = (band - from_edge + 0.5).clamp(0.0, 1.0);
+                if strip == 0.0 {
+                    continue;
+                }
+                // A soft rim, so that no pixel leaps in or out as the corner moves.
+                let weight = strip * (radius - (x * x + y * y).sqrt() + 0.5).clamp(0.0, 1.0);
                 if weight > 0.0 {
                     whole += weight;
                     if let Some(grey) = picture.at(column + u, row + v) {
@@ -94,13 +97,25 @@ impl Window {
 
 /// Fits a corner; `None` where there is none, or where it is not near the guess.
 ///
-/// `smoothing` is the standard deviation in pixels by which the picture was smoothed.
+/// `smoothing` is the standard deviation in pixels by which the picture was smoothed. After the first of several
+/// `passes` the window is laid anew where the corner was found, so that the guess does not matter.
 pub fn fit_corner<T: Copy + Into<f64>>(
     picture: &Picture<'_, T>,
     guess: &CornerGuess,
     kind: CornerKind,
     smoothing: f64,
+    passes: usize,
 ) -> Option<[f64; 2]> {
+    let fitted = (0..passes).try_fold(*guess, |guess, _| fitted(picture, &guess, kind, smoothing))?;
+    Some(fitted.place)
+}
+
+fn fitted<T: Copy + Into<f64>>(
+    picture: &Picture<'_, T>,
+    guess: &CornerGuess,
+    kind: CornerKind,
+    smoothing: f64,
+) -> Option<CornerGuess> {
     let numbers = [guess.place, guess.directions[0], guess.directions[1], guess.curvatures];
     if !numbers.iter().flatten().chain([&guess.radius, &guess.band]).all(|x| x.is_finite())
         || guess.radius <= 0.0
@@ -125,7 +140,11 @@ pub fn fit_corner<T: Copy + Into<f64>>(
     let good = moved <= (0.25 * radius).max(1.5)
         && fit[PRODUCT].abs() * 2.0 >= LEAST_CONTRAST
         && fit[LOG_BLUR] < BLUR_RANGE_PX[1].ln() - 1e-6;
-    good.then(|| [origin[0] as f64 + fit[X], origin[1] as f64 + fit[Y]])
+    good.then(|| CornerGuess {
+        place: [origin[0] as f64 + fit[X], origin[1] as f64 + fit[Y]],
+        directions: [FIRST, SECOND].map(|i| [fit[i].cos(), fit[i].sin()]),
+        ..*guess
+    })
 }
 
 /// Solves for the greys, which enter linearly, once for the first guess of the rest.
@@ -227,7 +246,7 @@ mod tests {
                 let grey = drawn(place, angles, 1.1, greys);
                 let picture = Picture::new(&grey, SIDE, SIDE).unwrap();
                 let start = guess([place[0] + 0.7, place[1] - 0.5], [angles[0] + 0.05, angles[1] - 0.04]);
-                let found = fit_corner(&picture, &start, kind, 1.0).unwrap();
+                let found = fit_corner(&picture, &start, kind, 1.0, 2).unwrap();
                 let error = (found[0] - place[0]).hypot(found[1] - place[1]);
                 assert!(error < 1e-4, "{kind:?} {place:?}: {error}");
             }
@@ -239,13 +258,13 @@ mod tests {
         let flat = vec![90.0; SIDE * SIDE];
         let picture = Picture::new(&flat, SIDE, SIDE).unwrap();
         for kind in [CornerKind::Crossing, CornerKind::Quadrants] {
-            assert!(fit_corner(&picture, &guess([20.0, 20.0], [0.0, 1.5]), kind, 1.0).is_none());
+            assert!(fit_corner(&picture, &guess([20.0, 20.0], [0.0, 1.5]), kind, 1.0, 1).is_none());
         }
         let grey = drawn([20.0, 20.0], [0.0, 1.5], 1.0, [120.0, 0.0, 0.0, 80.0]);
         let picture = Picture::new(&grey, SIDE, SIDE).unwrap();
         for place in [[20.0, 1.0], [-1e12, 5.0], [f64::NAN, 20.0], [26.0, 20.0]] {
             let start = guess(place, [0.0, 1.5]);
-            assert!(fit_corner(&picture, &start, CornerKind::Crossing, 1.0).is_none(), "{place:?}");
+            assert!(fit_corner(&picture, &start, CornerKind::Crossing, 1.0, 1).is_none(), "{place:?}");
         }
     }
 }

@@ -56,7 +56,7 @@ fn measured<T: Copy + Into<f64>>(picture: &Picture<'_, T>, spot: &Spot, gap: f64
             return None;
         }
     }
-    let samples = samples(picture, spot, &extent, 1.0 + reach / axes[0])?;
+    let samples = samples(picture, spot, &extent, axes[0], reach, band)?;
     let is_inside = |s: &Sample| s.distance < -band.min(0.5 * axes[0]);
     let is_outside = |s: &Sample| s.distance > band && s.distance <= reach;
     let outside: Vec<&Sample> = samples.iter().filter(|s| is_outside(s)).collect();
@@ -98,8 +98,14 @@ fn samples<T: Copy + Into<f64>>(
     picture: &Picture<'_, T>,
     spot: &Spot,
     extent: &Vector2<f64>,
-    grown: f64,
+    axis: f64,
+    reach: f64,
+    band: f64,
 ) -> Option<Vec<Sample>> {
+    let grown = 1.0 + reach / axis;
+    // The distance from the edge is at least (1 - q) times the shorter half axis.
+    let deep = (1.0 - band / axis).max(0.0).powi(2);
+    let far = grown.powi(2) * 4.0;
     let inverse = spot.shape.try_inverse()?;
     let [column, row] = nearest([spot.centre[0], spot.centre[1]]);
     #[expect(clippy::cast_possible_truncation, reason = "no spot is so large")]
@@ -111,8 +117,17 @@ fn samples<T: Copy + Into<f64>>(
             let offset = Vector2::new(u as f64, v as f64) - spot.centre;
             // Signed distance from the edge, to first order: (q - 1) / |grad q| with q the elliptical radius.
             let solved = inverse * offset;
-            let q = offset.dot(&solved).max(1e-12).sqrt();
-            samples.push(Sample { offset, distance: (q - 1.0) * q / solved.norm().max(1e-12), grey });
+            let squared = offset.dot(&solved);
+            if squared > far {
+                continue;
+            }
+            let distance = if squared < deep {
+                f64::NEG_INFINITY
+            } else {
+                let q = squared.max(1e-12).sqrt();
+                (q - 1.0) * q / (solved[0] * solved[0] + solved[1] * solved[1]).sqrt().max(1e-12)
+            };
+            samples.push(Sample { offset, distance, grey });
         }
     }
     Some(samples)

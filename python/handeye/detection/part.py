@@ -1,0 +1,70 @@
+"""The picture in which a target is searched, and where that is in the image in which it is measured."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from handeye.detection.base import Image
+from handeye.types.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of an image, or all of it, of another size or seen from another side.
+
+    Attributes
+    ----------
+    picture
+        (H, W) what to search.
+    to_image
+        (3, 3) homography from its pixels to those of the image.
+    side_px
+        So near to the sides of the picture a target may be cut.
+    """
+
+    picture: Image
+    to_image: FloatArray
+    side_px: float = 0.0
+
+    @classmethod
+    def whole(cls, image: Image, scale: float = 1.0) -> "Part":
+        """Return all of an image, reduced by a factor."""
+        small, factors = reduced(image, scale)
+        shift = 0.5 * factors - 0.5
+        return cls(small, np.array([[factors[0], 0, shift[0]], [0, factors[1], shift[1]], [0, 0, 1]]))
+
+    def places(self, pixels: FloatArray) -> FloatArray:
+        """Return places (..., 2) of the picture in pixels of the image."""
+        return mapped(self.to_image, pixels)
+
+    def inverse(self, pixels: FloatArray) -> FloatArray:
+        """Return pixels (..., 2) of the image in the picture."""
+        return mapped(np.asarray(np.linalg.inv(self.to_image), dtype=np.float64), pixels)
+
+    def shapes(self, centres: FloatArray, shapes: FloatArray) -> FloatArray:
+        """Return shapes (N, 2, 2) of spots at centres (N, 2) of the picture as they are in the image."""
+        J = jacobians(self.to_image, centres)
+        return J @ shapes @ J.swapaxes(1, 2)
+
+
+def mapped(homography: FloatArray, places: FloatArray) -> FloatArray:
+    """Return where a homography brings places (..., 2)."""
+    flat = places.reshape(-1, 2)
+    image = np.column_stack([flat, np.ones(len(flat))]) @ homography.T
+    return (image[:, :2] / image[:, 2:]).reshape(places.shape)
+
+
+def jacobians(homography: FloatArray, places: FloatArray) -> FloatArray:
+    """Return the derivatives (N, 2, 2) of `mapped` at places (N, 2)."""
+    depth = places @ homography[2, :2] + homography[2, 2]
+    image = mapped(homography, places)
+    return (homography[:2, :2] - image[:, :, np.newaxis] * homography[2, :2]) / depth[:, None, None]
+
+
+def reduced(image: Image, scale: float) -> tuple[Image, FloatArray]:
+    """Return a smaller image, and the factors (2,) from its size to that of the image."""
+    if scale >= 1:
+        return image, np.ones(2)
+    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.uint8), np.array(image.shape[::-1]) / small.shape[::-1]
