@@ -114,6 +114,7 @@ def run(
     max_views: int = 20,
     seed: int = 0,
     model: ModelName = ModelName.AUTO,
+    policy: str = "next_best_view",
     resume: bool = False,
     dry_run: bool = False,
     confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
@@ -155,6 +156,9 @@ def run(
         Of every choice by chance, and of the simulated cell.
     model
         auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
+    policy
+        How the next view is chosen: next_best_view, gain_per_second (the gain over the time that motion and
+        view take), random or max_distance.
     resume
         Go on with a session; everything else is taken from it.
     dry_run
@@ -177,6 +181,7 @@ def run(
         most_views=max_views,
         seed=seed,
         model=model,
+        policy=policy,
         speed_rad_s=float(np.deg2rad(limits.speed_deg_s)),
         workspace_m=_box(limits.workspace_mm),
         floor_m=limits.floor_mm / MM_PER_M,

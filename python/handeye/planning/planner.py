@@ -10,6 +10,7 @@ from handeye.errors import InputError
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.policies import NextBestView, Policy, Situation
 from handeye.planning.stopping import State, Stop, StopRule, first_verdict
+from handeye.planning.travel import Travel
 from handeye.solving.estimate import Estimate, Estimator, Sight
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
@@ -75,6 +76,8 @@ class PlannerOptions:
         While the standard deviation of the camera's position lies between these two, gains are averaged over
         sigma points of X and Y; beyond the second nothing can be predicted, below the first nothing changes.
         None to take the estimate at its word.
+    travel
+        Where the arm stands and how fast it is, for policies that weigh time; None if that is not known.
     """
 
     policy: Policy = field(default_factory=NextBestView)
@@ -83,6 +86,7 @@ class PlannerOptions:
     sight: Sight = field(default_factory=Sight)
     seed: int = 0
     young_sigma_m: tuple[float, float] | None = None
+    travel: Travel | None = None
 
 
 class Planner:
@@ -162,7 +166,9 @@ class Planner:
         stop = first_verdict(self._options.stop_rules, state)
         if stop is not None:
             return stop
-        situation = Situation(self._measurements.views, self._pool, gains, self._random)
+        travel, joints = self._options.travel, self._pool.joints
+        seconds = None if travel is None or joints is None else travel.seconds(joints)
+        situation = Situation(self._measurements.views, self._pool, gains, self._random, seconds)
         choice = self._options.policy.choose(situation)
         names = tuple(candidate.name for candidate in self._pool.candidates)
         chosen = self._pool.candidates[choice.index]

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,12 @@ from handeye.planning.feasibility import FeasiblePool, Generator, ViewLimits
 from handeye.planning.policies import Policy
 from handeye.planning.policies.next_best_view import NextBestView
 from handeye.planning.stopping import NumberOfViews, StopRule
+from handeye.planning.travel import Travel
 from handeye.robots import ArmKinematics
 from handeye.robots.protocol import Goal, Reading
 from handeye.session.attempt import Cell, Missed, Seen, attempt, encoded
 from handeye.session.entry import TRANSIENT, Entry, Failure
-from handeye.session.judging import labeled, objection
+from handeye.session.judging import foreseen, labeled, objection
 from handeye.session.request import Reach, Requested, reach
 from handeye.session.starting import Start, starting_goal
 from handeye.session.store import SessionStore
@@ -279,7 +281,11 @@ class Session:
         ]
         drawn = self._generator.draw(estimate, postures, random, shunned=shunned)
         options = PlannerOptions(
-            policy=self._wish.policy, stop_rules=self._wish.rules(), sight=drawn.sight, seed=self._wish.seed
+            policy=self._wish.policy,
+            stop_rules=self._wish.rules(),
+            sight=drawn.sight,
+            seed=self._wish.seed,
+            travel=self._travel(),
         )
         planner = Planner(measurements, drawn.pool, _known(estimate), options)
         body = self._generator.body(estimate)
@@ -308,6 +314,10 @@ class Session:
         )
         return self._end(reason, answer.sentence)
 
+    def _travel(self) -> Travel:
+        fastest = np.minimum(self._cell.arm.velocities, self._wish.speed_rad_s)
+        return Travel(np.array(self._standing()), fastest)
+
     def _goal(self, pose: Pose, joints: tuple[float, ...]) -> Goal:
         entries = self._store.entries
         number = 1 + sum(1 for entry in entries if entry.view is not None)
@@ -335,7 +345,8 @@ class Session:
     def _take(self, step: Step) -> None:
         timings = {"decide": float(step.decision.pop("seconds", 0.0))}
         digests = frozenset(e.image_digest for e in self._store.entries if e.image_digest is not None)
-        outcome = attempt(self._cell, step.goal, digests, timings)
+        foresee = partial(foreseen, self._cell.camera, self._cell.target, step.estimate)
+        outcome = attempt(self._cell, step.goal, digests, timings, foresee)
         number = len(self._store.entries) + 1
         if isinstance(outcome, Seen):
             outcome = self._judged(step, outcome)

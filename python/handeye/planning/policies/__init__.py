@@ -2,15 +2,19 @@
 
 from handeye.errors import InputError
 from handeye.planning.policies.base import Choice, Policy, Situation
+from handeye.planning.policies.gain_per_second import GainPerSecond
 from handeye.planning.policies.max_distance import MaxDistance
 from handeye.planning.policies.next_best_view import NextBestView
 from handeye.planning.policies.random import Random
 
-POLICIES: dict[str, type[Policy]] = {policy.name: policy for policy in (NextBestView, Random, MaxDistance)}
+POLICIES: dict[str, type[Policy]] = {
+    policy.name: policy for policy in (NextBestView, Random, MaxDistance, GainPerSecond)
+}
 
 __all__ = [
     "POLICIES",
     "Choice",
+    "GainPerSecond",
     "MaxDistance",
     "NextBestView",
     "Policy",

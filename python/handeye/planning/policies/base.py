@@ -26,12 +26,15 @@ class Situation:
         (N,) gain of each candidate; NaN where too little of the target would be in sight.
     random
         The planner's own source of chance.
+    seconds
+        (N,) what each candidate takes, motion and view; None where that is not known.
     """
 
     views: Sequence[View]
     pool: Pool
     gains: FloatArray
     random: np.random.Generator
+    seconds: FloatArray | None = None
 
     @property
     def feasible(self) -> IndexArray:
