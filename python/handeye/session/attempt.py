@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from handeye.cameras.protocol import Frame, Grey, ImageSource
-from handeye.detection import Detection, NotFound, Reason, detect
+from handeye.detection import Detection, NotFound, Prediction, Reason, detect
 from handeye.errors import DeviceError, HandeyeError
 from handeye.planning.collisions import Workspace
 from handeye.robots import Arm
@@ -18,7 +18,7 @@ from handeye.robots.replay import is_near
 from handeye.session.entry import Failure
 from handeye.session.patience import within
 from handeye.solving.measurements import MIN_POINTS
-from handeye.types import Camera, Target
+from handeye.types import Camera, Pose, Target
 
 # Reasons that the picture itself gives: light and focus, not the place.
 _POOR = frozenset(
@@ -104,7 +104,13 @@ class Cell:
         return within(self.patience.read_s, "robot", self.robot.read_pose)
 
 
-def attempt(cell: Cell, goal: Goal, digests: frozenset[str], timings: dict[str, float]) -> Seen | Missed:
+def attempt(
+    cell: Cell,
+    goal: Goal,
+    digests: frozenset[str],
+    timings: dict[str, float],
+    foresee: Callable[[Pose], Prediction | None] | None = None,
+) -> Seen | Missed:
     """Try to take one view.
 
     Parameters
@@ -117,6 +123,8 @@ def attempt(cell: Cell, goal: Goal, digests: frozenset[str], timings: dict[str, 
         Of the images so far: a picture that comes again is no new picture.
     timings
         Filled with the seconds that each part took.
+    foresee
+        Tells from the pose read back where in the image the target should be.
     """
     if not cell.workspace.contains(goal.T_base_flange.translation):
         return Missed(Failure.MOTION_REFUSED, "the goal is outside the stated workspace", moved=False)
@@ -151,7 +159,8 @@ def attempt(cell: Cell, goal: Goal, digests: frozenset[str], timings: dict[str, 
         return Missed(failure, error.message, moved=True)
     timings["grab"] = time.monotonic() - started
     started = time.monotonic()
-    found = _look(cell, frame, digests)
+    predicted = None if foresee is None else foresee(reading.T_base_flange)
+    found = _look(cell, frame, digests, predicted)
     timings["detect"] = time.monotonic() - started
     if isinstance(found, Missed):
         return found
@@ -159,7 +168,9 @@ def attempt(cell: Cell, goal: Goal, digests: frozenset[str], timings: dict[str, 
     return Seen(reading, detection, frame.image, digest, frame.timestamp_s, note)
 
 
-def _look(cell: Cell, frame: Frame, digests: frozenset[str]) -> tuple[Detection, str | None] | Missed:
+def _look(
+    cell: Cell, frame: Frame, digests: frozenset[str], predicted: Prediction | None
+) -> tuple[Detection, str | None] | Missed:
     """Find the target in a frame, and tell frames that are no pictures of now."""
     if frame.points is not None:
         if len(frame.points.point_ids) < MIN_POINTS:
@@ -181,7 +192,7 @@ def _look(cell: Cell, frame: Frame, digests: frozenset[str]) -> tuple[Detection,
     digest = _digest(image.tobytes())
     if digest in digests:
         return Missed(Failure.STALE_IMAGE, "the same picture as before, bit for bit", moved=True)
-    found = detect(image, cell.target)
+    found = detect(image, cell.target, predicted=predicted)
     if isinstance(found, NotFound):
         failure = Failure.POOR_IMAGE if found.reason in _POOR else Failure.NOT_FOUND
         return Missed(failure, f"{found.evidence} ({found.reason})", moved=True, digest=digest)

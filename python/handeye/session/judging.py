@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from handeye.detection import Detection, relabeled
+from handeye import _core
+from handeye.detection import Detection, Prediction, relabeled
 from handeye.errors import HandeyeError
 from handeye.solving import Estimate, view_pose
 from handeye.types import Camera, Pose, Target, View
@@ -14,6 +15,8 @@ LARGEST_SURPRISE = (0.02, np.deg2rad(3.0))
 SIGMAS = 6.0
 # Fewer views than these cannot speak against another one.
 FEWEST_WITNESSES = 4
+# The arm's own errors are not all known: a prediction is never taken to be better than this.
+LEAST_MARGIN_PX = 8.0
 
 
 def labeled(camera: Camera, target: Target, detection: Detection, T_base: Pose, expected: Pose) -> Detection:
@@ -60,10 +63,45 @@ def objection(
     return None if None in complaints else complaints[0]
 
 
+def foreseen(camera: Camera, target: Target, estimate: Estimate | None, T_base: Pose) -> Prediction | None:
+    """Return where the target should be seen from a robot pose, None where the views do not tell yet.
+
+    The margin is what the estimate does not know, so many deviations of it.
+    """
+    if estimate is None or not estimate.determined:
+        return None
+    A = estimate.mounting.chain(T_base)
+    expected = estimate.X @ A @ estimate.Y
+    pixels, seen = _core.project_features(
+        camera.lens, camera.parameters, expected.matrix, target.points, target.radii_m
+    )
+    depth = float(expected.act(target.points.mean(axis=0)[np.newaxis])[0, 2])
+    if depth <= 0 or not seen.any():
+        return None
+    sigma_m, sigma_rad = _deviations(estimate, A, expected)
+    size = float(np.ptp(target.points, axis=0).max())
+    margin = SIGMAS * float(camera.parameters[:2].max()) * (sigma_m + 0.5 * sigma_rad * size) / depth
+    return Prediction(np.where(seen[:, np.newaxis], pixels, np.nan), max(LEAST_MARGIN_PX, margin))
+
+
 def _surprise(estimate: Estimate, A: Pose, expected: Pose, seen: Pose) -> str | None:
     middle = estimate.target.points.mean(axis=0)[np.newaxis]
     off = float(np.linalg.norm(seen.act(middle) - expected.act(middle)))
     turn = (expected.inverse() @ seen).rotation_angle_rad
+    sigma_m, sigma_rad = _deviations(estimate, A, expected)
+    most_m = max(LARGEST_SURPRISE[0], SIGMAS * sigma_m)
+    most_rad = max(LARGEST_SURPRISE[1], SIGMAS * sigma_rad)
+    if off <= most_m and turn <= most_rad:
+        return None
+    return (
+        f"the target would be {1e3 * off:.0f} mm and {np.rad2deg(turn):.1f} deg from where all other views "
+        f"have it"
+    )
+
+
+def _deviations(estimate: Estimate, A: Pose, expected: Pose) -> tuple[float, float]:
+    """Return the deviations (metres, radians) of where the estimate has the middle of the target."""
+    middle = estimate.target.points.mean(axis=0)[np.newaxis]
     # First order: C = X A Y moves with the left twists of X and, carried over by X A, of Y.
     carried = (estimate.X @ A).adjoint()
     jacobian = np.hstack([np.eye(6), carried])
@@ -76,11 +114,4 @@ def _surprise(estimate: Estimate, A: Pose, expected: Pose, seen: Pose) -> str | 
     robot = max(h.robot_translation_m for h in estimate.hypotheses)
     sigma_m = float(np.sqrt(np.trace(covariance[:3, :3]) + 3 * robot**2))
     sigma_rad = float(np.sqrt(np.trace(covariance[3:, 3:])))
-    most_m = max(LARGEST_SURPRISE[0], SIGMAS * sigma_m)
-    most_rad = max(LARGEST_SURPRISE[1], SIGMAS * sigma_rad)
-    if off <= most_m and turn <= most_rad:
-        return None
-    return (
-        f"the target would be {1e3 * off:.0f} mm and {np.rad2deg(turn):.1f} deg from where all other views "
-        f"have it"
-    )
+    return sigma_m, sigma_rad

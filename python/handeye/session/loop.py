@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from handeye.robots import ArmKinematics
 from handeye.robots.protocol import Goal, Reading
 from handeye.session.attempt import Cell, Missed, Seen, attempt, encoded
 from handeye.session.entry import TRANSIENT, Entry, Failure
-from handeye.session.judging import labeled, objection
+from handeye.session.judging import foreseen, labeled, objection
 from handeye.session.request import Reach, Requested, reach
 from handeye.session.starting import Start, starting_goal
 from handeye.session.store import SessionStore
@@ -344,7 +345,8 @@ class Session:
     def _take(self, step: Step) -> None:
         timings = {"decide": float(step.decision.pop("seconds", 0.0))}
         digests = frozenset(e.image_digest for e in self._store.entries if e.image_digest is not None)
-        outcome = attempt(self._cell, step.goal, digests, timings)
+        foresee = partial(foreseen, self._cell.camera, self._cell.target, step.estimate)
+        outcome = attempt(self._cell, step.goal, digests, timings, foresee)
         number = len(self._store.entries) + 1
         if isinstance(outcome, Seen):
             outcome = self._judged(step, outcome)

@@ -1,0 +1,22 @@
+"""Where the next view should show the target, as far as the views so far tell."""
+
+import numpy as np
+
+from cells import Cell
+from handeye.session.judging import LEAST_MARGIN_PX, foreseen
+from handeye.solving import Measurements, make_estimator
+from handeye.types.calibration import ModelName
+
+
+def test_the_target_is_foreseen_within_the_margin() -> None:
+    cell = Cell(np.random.default_rng(4))
+    poses = [cell.robot_pose(cell.look()) for _ in range(9)]
+    views = cell.views(poses[:8], sigma_px=0.1, robot_sigma=np.array([2e-4] * 3 + [2e-4] * 3))
+    measurements = Measurements.of(cell.mounting, cell.camera, cell.target).with_views(views)
+    estimate = make_estimator(ModelName.AUTO, None)(measurements)
+    assert foreseen(cell.camera, cell.target, None, poses[8]) is None
+    predicted = foreseen(cell.camera, cell.target, estimate, poses[8])
+    assert predicted is not None
+    off = np.linalg.norm(predicted.pixels - cell.view("next", poses[8]).pixels, axis=1)
+    assert off.max() < predicted.margin_px
+    assert LEAST_MARGIN_PX <= predicted.margin_px < 100
