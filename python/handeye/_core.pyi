@@ -374,6 +374,7 @@ class Compressed:
         sides: list[str] | None = None,
         levels: tuple[float, float] | None = None,
         joints: JointErrors | None = None,
+        likeness: ArrayLike | None = None,
         prior_degrees: float = 20.0,
         floor_px2: float = 1e-8,
         linearisations: int = 5,
@@ -381,7 +382,9 @@ class Compressed:
         """The answer from these views, averaged over a grid of robot noise levels and sides.
 
         `levels` (metres, radians) gives them instead; then `sides` are all that is compared. With `joints`
-        noise of         the joints is a further hypothesis, and their offsets are further parameters.
+        noise of the joints is a further hypothesis, and their offsets are further parameters. With `likeness`
+        (K, K), the correlation of smooth errors between the views, errors that change smoothly with the posture
+        are further hypotheses.
         """
 
 class Posterior:
@@ -391,6 +394,8 @@ class Posterior:
     def x(self) -> NDArray[float64]: ...
     @property
     def y(self) -> NDArray[float64]: ...
+    @property
+    def smooth_probability(self) -> float: ...
     @property
     def camera_delta(self) -> list[float]: ...
     @property

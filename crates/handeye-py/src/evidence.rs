@@ -2,8 +2,8 @@
 
 use handeye_core::evidence::{
     CompressedView, EXACT_OFFSET_RAD, EvidenceOptions, Hypothesis, JointErrors as CoreJointErrors,
-    JointPrior, LevelPrior, Posterior as CorePosterior, WeakPrior, compress, estimate, shrunk_variances,
-    start_from_poses,
+    JointPrior, LevelPrior, Posterior as CorePosterior, SMOOTH_ODDS, SmoothError, WeakPrior, compress,
+    estimate, shrunk_variances, start_from_poses,
 };
 use handeye_core::least_squares::{PixelParameters, Side};
 use handeye_core::se3::Se3;
@@ -214,7 +214,8 @@ impl Compressed {
     /// The answer from these views, averaged over the hypotheses; see the type stub.
     #[pyo3(signature = (
         *, views=None, camera_prior=None, start=None, prior_sigma_m=1.0, exact_probability=1.0/3.0,
-        sides=None, levels=None, joints=None, prior_degrees=20.0, floor_px2=1e-8, linearisations=5,
+        sides=None, levels=None, joints=None, likeness=None, prior_degrees=20.0, floor_px2=1e-8,
+        linearisations=5,
     ))]
     #[expect(clippy::too_many_arguments, reason = "one keyword per assumption")]
     fn estimate<'py>(
@@ -228,6 +229,7 @@ impl Compressed {
         sides: Option<Vec<String>>,
         levels: Option<(f64, f64)>,
         joints: Option<&JointErrors>,
+        likeness: Option<Array<'py>>,
         prior_degrees: f64,
         floor_px2: f64,
         linearisations: usize,
@@ -253,7 +255,15 @@ impl Compressed {
                 "noise of the joints and levels of the robot's poses cannot both be given",
             ));
         }
-        let prior = LevelPrior { exact_probability, ..LevelPrior::default() };
+        let smooth = match likeness {
+            Some(correlation) => {
+                let correlation = square(py, "likeness", &correlation)?;
+                Some(SmoothError::new(&correlation).map_err(|e| to_python(py, e))?)
+            }
+            None => None,
+        };
+        let smooth_odds = if smooth.is_some() { SMOOTH_ODDS } else { 0.0 };
+        let prior = LevelPrior { exact_probability, smooth_odds, ..LevelPrior::default() };
         let hypotheses = match joints {
             Some(joints) => joints.hypotheses(&prior, &sides, given_levels),
             None => given_levels.unwrap_or_else(|| prior.grid_of(&sides)),
@@ -263,6 +273,7 @@ impl Compressed {
             prior: weak_prior(prior_sigma_m),
             camera_prior,
             joints: joint_errors,
+            smooth,
             linearisations,
         };
         let (posterior, variances, origin) = py
@@ -317,6 +328,12 @@ impl Posterior {
     #[getter]
     fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f64>> {
         convert::matrix_out(py, &self.inner.y.to_matrix())
+    }
+
+    /// Probability that the robot's error changes smoothly with the posture.
+    #[getter]
+    fn smooth_probability(&self) -> f64 {
+        self.hypotheses.iter().zip(&self.inner.weights).filter(|(h, _)| h.smooth).map(|(_, w)| w).sum()
     }
 
     /// Free camera parameters relative to their calibrated values.

@@ -54,8 +54,10 @@ class CellOptions:
         Fewest and most views.
     pixel_sigma_px
         Noise of the pixels per axis.
-    translation_sigma_m, rotation_sigma_deg
-        Levels of the robot's white error per axis.
+    rotation_sigma_deg, lever_m, translation_sigma_m
+        Levels of the robot's white error per axis. An arm's error is mostly error of its joints times its
+        reach, so the translation's is the rotation's times a lever (about 3 m in the public sets of a real
+        arm), unless it is given.
     encoder_sigma_deg, offset_sigma_deg
         Levels of the error of the joint angles.
     length_sigma_m, twist_sigma_deg
@@ -70,8 +72,9 @@ class CellOptions:
     target: Target = TARGET
     views: tuple[int, int] = (8, 12)
     pixel_sigma_px: tuple[float, float] = (0.05, 0.2)
-    translation_sigma_m: tuple[float, float] = (0.05e-3, 0.5e-3)
-    rotation_sigma_deg: tuple[float, float] = (0.005, 0.05)
+    rotation_sigma_deg: tuple[float, float] = (0.003, 0.03)
+    lever_m: tuple[float, float] = (1.5, 6.0)
+    translation_sigma_m: tuple[float, float] | None = None
     encoder_sigma_deg: tuple[float, float] = (0.003, 0.03)
     offset_sigma_deg: tuple[float, float] = (0.005, 0.05)
     length_sigma_m: tuple[float, float] = (0.05e-3, 0.5e-3)
@@ -278,8 +281,11 @@ def _reported(
     """`T_base_flange` (K, 4, 4) and joints (K, 6) as the robot reports them; it truly stands at `joints`."""
     true = arm.forward(joints)
     if kind in {ErrorKind.WHITE_FLANGE, ErrorKind.WHITE_BASE}:
-        metres = _level(random, options.translation_sigma_m)
         degrees = _level(random, options.rotation_sigma_deg)
+        if options.translation_sigma_m is None:
+            metres = np.deg2rad(degrees) * _level(random, options.lever_m)
+        else:
+            metres = _level(random, options.translation_sigma_m)
         errors = _core.se3_exp(np.array([_twist(random, metres, degrees) for _ in joints]))
         return true @ errors if kind is ErrorKind.WHITE_FLANGE else errors @ true, joints
     if kind is ErrorKind.ENCODER:

@@ -24,12 +24,14 @@ from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
 
 # A camera calibration's covariance is a plain inverse of J'J: too small by about this factor in deviation.
-CAMERA_INFLATION = 1.5
-# No view's pixel noise is believed to be less. Even on rendered pictures corners err by a hundredth of a pixel
-# or so, much of it shared by neighbouring corners: such an error no number of points averages out.
+CAMERA_INFLATION = 1.1
+# No view's pixel noise is believed to be less. Even on rendered pictures corners err by a hundredth of a
+# pixel or so, much of it shared by neighbouring corners: such an error no number of points averages out.
 LEAST_PIXEL_SIGMA = 0.01
 # Degrees of freedom below which regions would have no useful quantile.
 FEWEST_DEGREES_OF_FREEDOM = 4.5
+# Poses of the flange further apart than this have little of a smooth error in common.
+LIKENESS_M, LIKENESS_RAD = 1.0, 2.0
 # A mirrored pose is looked at where it fits less than this many times worse than the best.
 MIRROR_RATIO = 8.0
 # Without a covariance: relative focal length, principal point as a share of the width, coefficients.
@@ -66,6 +68,21 @@ def camera_prior(camera: Camera, inflation: float = CAMERA_INFLATION) -> CameraP
     return CameraPrior(free, information / np.outer(deviations_free, deviations_free))
 
 
+def posture_likeness(measurements: Measurements) -> FloatArray:
+    """Return how far a smooth error of the robot is the same in two views, (K, K) correlations.
+
+    It falls off as a Gaussian of the distance and of the angle between the flange's poses.
+    """
+    poses = np.array([view.T_base_flange.matrix for view in measurements.views]).reshape(-1, 4, 4)
+    positions, rotations = poses[:, :3, 3], poses[:, :3, :3]
+    squared_m2 = ((positions[:, np.newaxis] - positions) ** 2).sum(axis=2)
+    cosines = (np.einsum("iab,jab->ij", rotations, rotations) - 1) / 2
+    angles = np.arccos(np.clip(cosines, -1, 1))
+    likeness = np.exp(-0.5 * (squared_m2 / LIKENESS_M**2 + (angles / LIKENESS_RAD) ** 2))
+    np.fill_diagonal(likeness, 1.0)
+    return likeness
+
+
 @dataclass(frozen=True)
 class AutoOptions:
     """What may be changed of the default model; nothing needs to be.
@@ -82,6 +99,8 @@ class AutoOptions:
         Factor on the deviations of the camera's calibration.
     free_camera
         Whether camera parameters are free at all.
+    smooth
+        Whether the robot's error may be one that changes smoothly with the posture.
     kinematics
         The arm, if it is known; every view must then have joint positions.
     joint_noise_rad
@@ -96,6 +115,7 @@ class AutoOptions:
     levels: tuple[float, float] | None = None
     camera_inflation: float = CAMERA_INFLATION
     free_camera: bool = True
+    smooth: bool = True
     kinematics: Kinematics | None = None
     joint_noise_rad: float | None = None
     joint_offset_rad: float | None = None
@@ -145,6 +165,7 @@ class AutoEstimator:
             sides=sides,
             levels=options.levels,
             joints=None if arm is None else arm.errors(options.joint_noise_rad, options.joint_offset_rad),
+            likeness=None if options.levels or not options.smooth else posture_likeness(measurements),
             floor_px2=LEAST_PIXEL_SIGMA**2,
         )
         parameters = np.array(measurements.camera.parameters)
@@ -157,7 +178,7 @@ class AutoEstimator:
         )
         sigma_px = np.sqrt(posterior.variances_px2)
         X, Y = Pose(posterior.x), Pose(posterior.y)
-        noise = _noise(sigma_px, hypotheses, arm)
+        noise = replace(_noise(sigma_px, hypotheses, arm), smooth_probability=posterior.smooth_probability)
         return Estimate(
             mounting=mounting,
             target=measurements.target,

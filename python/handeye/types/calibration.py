@@ -53,6 +53,9 @@ class Noise:
         How the levels were found, in one line.
     evidence
         Posterior probability of each side that was compared.
+    smooth_probability
+        Posterior probability that the robot's error changes smoothly with its posture, and is not another in each
+        view; the covariance counts that, and grows.
     """
 
     pixel_sigma_px: tuple[float, ...]
@@ -62,6 +65,7 @@ class Noise:
     how: str = ""
     evidence: dict[str, float] = field(default_factory=dict[str, float])
     joint_rad: float = 0.0
+    smooth_probability: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON, with units in the keys."""
@@ -75,6 +79,7 @@ class Noise:
             "robot_rotation_deg": float(np.rad2deg(self.robot_rotation_rad)),
             "how": self.how,
             "evidence": dict(self.evidence),
+            "smooth_probability": self.smooth_probability,
         }
 
 

@@ -11,6 +11,8 @@ pub struct Hypothesis {
     pub translation_m: f64,
     /// Standard deviation per axis, radians.
     pub rotation_rad: f64,
+    /// Whether the error changes smoothly with the posture, or is another in each view. Needs [`super::SmoothError`].
+    pub smooth: bool,
     /// Standard deviation of the noise of the joints, radians; zero for none. Needs [`super::JointErrors`].
     pub joint_rad: f64,
     /// Standard deviation of the offsets of the joints, radians; meaningless without [`super::JointErrors`].
@@ -26,6 +28,7 @@ impl Hypothesis {
             side: None,
             translation_m: 0.0,
             rotation_rad: 0.0,
+            smooth: false,
             joint_rad: 0.0,
             offset_rad: EXACT_OFFSET_RAD,
             log_prior,
@@ -44,8 +47,8 @@ impl Hypothesis {
 
     /// Whether the noise is the same, whatever the offsets.
     pub(super) fn same_noise(&self, other: &Self) -> bool {
-        (self.side, self.translation_m, self.rotation_rad, self.joint_rad)
-            == (other.side, other.translation_m, other.rotation_rad, other.joint_rad)
+        (self.side, self.translation_m, self.rotation_rad, self.smooth, self.joint_rad)
+            == (other.side, other.translation_m, other.rotation_rad, other.smooth, other.joint_rad)
     }
 }
 
@@ -135,7 +138,17 @@ pub struct LevelPrior {
     pub lever_grid: (f64, f64, usize),
     /// Prior probability that the robot is exact.
     pub exact_probability: f64,
+    /// How much likelier an error on one side is smooth than another in each view; zero leaves smooth ones out.
+    pub smooth_odds: f64,
+    /// As `rotation_grid`, of smooth errors: they need more work, and less resolution.
+    pub smooth_rotation_grid: (f64, f64, usize),
+    /// As `lever_grid`, of smooth errors.
+    pub smooth_lever_grid: (f64, f64, usize),
 }
+
+/// Prior odds of smooth errors where the postures are known. What is smooth shows itself within a few views; before,
+/// the odds keep white errors from looking less certain than they are.
+pub const SMOOTH_ODDS: f64 = 0.03;
 
 impl Default for LevelPrior {
     fn default() -> Self {
@@ -147,6 +160,9 @@ impl Default for LevelPrior {
             rotation_grid: (5e-4_f64.to_radians(), 0.3_f64.to_radians(), 12),
             lever_grid: (0.3, 10.0, 6),
             exact_probability: 1.0 / 3.0,
+            smooth_odds: 0.0,
+            smooth_rotation_grid: (1e-3_f64.to_radians(), 0.3_f64.to_radians(), 9),
+            smooth_lever_grid: (1.0, 6.0, 3),
         }
     }
 }
@@ -158,6 +174,21 @@ fn geometric(low: f64, high: f64, n: usize) -> Vec<f64> {
 }
 
 impl LevelPrior {
+    /// Rotation levels and levers with the logarithms of their probabilities, which sum to one.
+    fn levels(&self, rotations: (f64, f64, usize), levers: (f64, f64, usize)) -> Vec<(f64, f64, f64)> {
+        let mut levels = Vec::new();
+        for rotation in geometric(rotations.0, rotations.1, rotations.2) {
+            for lever in geometric(levers.0, levers.1, levers.2) {
+                let a = (rotation / self.rotation_median_rad).ln() / self.rotation_spread;
+                let b = (lever / self.lever_median_m).ln() / self.lever_spread;
+                levels.push((rotation, lever, -0.5 * (a * a + b * b)));
+            }
+        }
+        let total = levels.iter().map(|l| l.2.exp()).sum::<f64>().ln();
+        levels.iter_mut().for_each(|l| l.2 -= total);
+        levels
+    }
+
     /// The grid over both sides; probabilities sum to one.
     pub fn grid(&self) -> Vec<Hypothesis> {
         self.grid_of(&[Side::Left, Side::Right])
@@ -170,28 +201,27 @@ impl LevelPrior {
 
     /// As [`LevelPrior::grid_of`]; noise of the joints, where known how it acts, is as likely as either side.
     pub fn grid_with(&self, sides: &[Side], joints: Option<&LogNormal>) -> Vec<Hypothesis> {
-        let mut levels = Vec::new();
-        let (low, high, n) = self.rotation_grid;
-        for rotation in geometric(low, high, n) {
-            let (low, high, n) = self.lever_grid;
-            for lever in geometric(low, high, n) {
-                let a = (rotation / self.rotation_median_rad).ln() / self.rotation_spread;
-                let b = (lever / self.lever_median_m).ln() / self.lever_spread;
-                levels.push((rotation, lever, -0.5 * (a * a + b * b)));
-            }
-        }
-        let total: f64 = levels.iter().map(|l| l.2.exp()).sum();
-        let mut grid = Vec::with_capacity(1 + levels.len() * sides.len());
+        let white = self.levels(self.rotation_grid, self.lever_grid);
+        let smooth = self.levels(self.smooth_rotation_grid, self.smooth_lever_grid);
+        let mut grid = Vec::with_capacity(1 + (white.len() + smooth.len()) * sides.len());
         if self.exact_probability > 0.0 {
             grid.push(Hypothesis::exact(self.exact_probability.ln()));
         }
         let kinds = sides.len() + usize::from(joints.is_some());
         let each = ((1.0 - self.exact_probability) / kinds as f64).ln();
-        let share = each - total.ln();
+        let smooth_share = self.smooth_odds / (1.0 + self.smooth_odds);
         for side in sides {
-            grid.extend(levels.iter().map(|(rotation, lever, log_prior)| {
-                Hypothesis::twists(*side, rotation * lever, *rotation, log_prior + share)
+            grid.extend(white.iter().map(|(rotation, lever, log)| {
+                Hypothesis::twists(*side, rotation * lever, *rotation, log + each + (1.0 - smooth_share).ln())
             }));
+        }
+        if self.smooth_odds > 0.0 {
+            for side in sides {
+                grid.extend(smooth.iter().map(|(rotation, lever, log)| Hypothesis {
+                    smooth: true,
+                    ..Hypothesis::twists(*side, rotation * lever, *rotation, log + each + smooth_share.ln())
+                }));
+            }
         }
         if let Some(joints) = joints {
             let values = joints.values();

@@ -10,12 +10,14 @@ mod compressed;
 mod hypotheses;
 mod joints;
 mod posterior;
+mod smooth;
 
 pub use chain::{ChainStart, WeakPrior, start_from_poses};
 pub use compressed::{CompressedView, compress, shrunk_variances};
-pub use hypotheses::{EXACT_OFFSET_RAD, Hypothesis, JointPrior, LevelPrior, LogNormal};
+pub use hypotheses::{EXACT_OFFSET_RAD, Hypothesis, JointPrior, LevelPrior, LogNormal, SMOOTH_ODDS};
 pub use joints::JointErrors;
 pub use posterior::{EvidenceOptions, Posterior, estimate};
+pub use smooth::SmoothError;
 
 #[cfg(test)]
 mod tests;

@@ -11,6 +11,7 @@ use super::chain::WeakPrior;
 use super::compressed::CompressedView;
 use super::hypotheses::Hypothesis;
 use super::joints::JointErrors;
+use super::smooth::SmoothError;
 use crate::error::Error;
 use crate::least_squares::Side;
 use crate::se3::Se3;
@@ -24,6 +25,8 @@ pub struct EvidenceOptions {
     pub camera_prior: DMatrix<f64>,
     /// How errors of the joints move the motions, where the arm's kinematics are known.
     pub joints: Option<JointErrors>,
+    /// How alike smooth errors are between the views, where such are supposed.
+    pub smooth: Option<SmoothError>,
     /// Most re-linearisations.
     pub linearisations: usize,
 }
@@ -94,8 +97,11 @@ pub fn estimate(
 ) -> Result<Posterior, Error> {
     let n_c = options.camera_prior.nrows();
     let n_q = options.joints.as_ref().map_or(0, JointErrors::offset_count);
-    if views.len() != variances_px2.len() || views.is_empty() || hypotheses.is_empty() {
-        return Err(Error::invalid("views and pixel variances must be as many, and hypotheses at least one"));
+    if views.len() != variances_px2.len() || views.is_empty() {
+        return Err(Error::invalid("views and pixel variances must be as many, at least one"));
+    }
+    if hypotheses.iter().all(|h| h.smooth) {
+        return Err(Error::invalid("at least one hypothesis must not be smooth"));
     }
     if views.iter().any(|v| v.sensitivity.ncols() != n_c) {
         return Err(Error::invalid(format!("views compressed with other than {n_c} camera parameters")));
@@ -107,6 +113,13 @@ pub fn estimate(
         }
         None => {}
     }
+    match &options.smooth {
+        Some(smooth) => smooth.check(views.len())?,
+        None if hypotheses.iter().any(|h| h.smooth) => {
+            return Err(Error::invalid("smooth errors need to know how alike the postures are"));
+        }
+        None => {}
+    }
     let (mut x, mut y) = start;
     let mut focus: Option<Vec<usize>> = None;
     let mut worth: Vec<usize> = (0..hypotheses.len()).collect();
@@ -114,7 +127,11 @@ pub fn estimate(
     // Linearise under the likeliest hypotheses first; the whole grid is weighed once the chain stands.
     for round in 0..=options.linearisations {
         let last = round == options.linearisations;
-        let chosen = if last { worth.clone() } else { focus.clone().unwrap_or_else(|| worth.clone()) };
+        let mut chosen = if last { worth.clone() } else { focus.clone().unwrap_or_else(|| worth.clone()) };
+        if !last {
+            // Smooth errors say how far the answer may be off, not what it is.
+            chosen.retain(|i| !hypotheses[*i].smooth);
+        }
         let prepared = prepare(views, variances_px2, &x, &y, options.joints.as_ref());
         let camera = camera_terms(views, variances_px2, &options.camera_prior);
         // Hypotheses that differ only in the offsets stand side by side and share the sums over views.
@@ -123,7 +140,7 @@ pub fn estimate(
             .iter()
             .filter_map(|i| {
                 if !sums.as_ref().is_some_and(|(j, _)| hypotheses[*j].same_noise(&hypotheses[*i])) {
-                    sums = Some((*i, sum_up(&prepared, &hypotheses[*i])));
+                    sums = Some((*i, sum_up(&prepared, &hypotheses[*i], options.smooth.as_ref())));
                 }
                 let sums = sums.as_ref()?.1.as_ref()?;
                 let linear = linearise(sums, &hypotheses[*i], &x, options, &camera)?;
@@ -138,12 +155,10 @@ pub fn estimate(
         if round == 0 && options.joints.is_some() {
             // Offsets multiply the grid; what is hopeless at the first linearisation stays so.
             worth = evaluated.iter().filter(|e| e.2 > best - HOPELESS).map(|e| e.0).collect();
+            worth.extend((0..hypotheses.len()).filter(|i| hypotheses[*i].smooth));
         }
         let total: f64 = evaluated.iter().map(|e| (e.2 - best).exp()).sum();
-        let mut mean = DVector::zeros(12 + n_c + n_q);
-        for (_, linear, log) in &evaluated {
-            mean += &linear.theta * ((log - best).exp() / total);
-        }
+        let mean = average(&evaluated, hypotheses, 12 + n_c + n_q);
         if last {
             outcome = Some((evaluated, mean, best, total));
             break;
@@ -153,7 +168,7 @@ pub fn estimate(
         y = Se3::exp(&Vector6::from_column_slice(&mean.as_slice()[6..12])) * y;
         let mut order: Vec<(usize, f64)> = evaluated.iter().map(|e| (e.0, e.2)).collect();
         order.sort_by(|a, b| b.1.total_cmp(&a.1));
-        focus = Some(order.iter().take(8).map(|o| o.0).collect());
+        focus = Some(order.iter().map(|o| o.0).filter(|i| !hypotheses[*i].smooth).take(8).collect());
         if step < STEP_TOLERANCE && round > 0 {
             // The chain stands: go to the last round, which weighs the whole grid.
             focus = None;
@@ -166,6 +181,24 @@ pub fn estimate(
         joint_offsets: mean.rows(12 + n_c, n_q).into_owned(),
         ..posterior
     })
+}
+
+/// The answer: averaged over the hypotheses whose errors are another in each view.
+///
+/// What of a smooth error all views share cannot be told from `X` and `Y`, and the robot errs so again when it goes
+/// where the views were: taking it up predicts better than leaving it out (held-out views of real arms). How far the
+/// truth may be from such an answer is in the covariance, which counts all hypotheses.
+fn average(evaluated: &[(usize, Linear, f64)], hypotheses: &[Hypothesis], n: usize) -> DVector<f64> {
+    let chosen = || evaluated.iter().filter(|e| !hypotheses[e.0].smooth);
+    let best = chosen().map(|e| e.2).fold(f64::NEG_INFINITY, f64::max);
+    let mut mean = DVector::zeros(n);
+    let mut total = 0.0;
+    for (_, linear, log) in chosen() {
+        let weight = (log - best).exp();
+        mean += &linear.theta * weight;
+        total += weight;
+    }
+    mean / total
 }
 
 fn finish(
@@ -268,11 +301,8 @@ fn camera_terms(
     (information, gradient)
 }
 
-/// Covariance of the robot's error of a hypothesis in the camera frame.
-fn robot_covariance(view: &View, hypothesis: &Hypothesis) -> Option<Matrix6<f64>> {
-    if hypothesis.joint_rad > 0.0 {
-        return Some(view.joints? * hypothesis.joint_rad.powi(2));
-    }
+/// Root of the covariance of the robot's error of a hypothesis in the camera frame.
+fn robot_root(view: &View, hypothesis: &Hypothesis) -> Option<Matrix6<f64>> {
     let map = match hypothesis.side? {
         Side::Left => &view.left,
         Side::Right => &view.right,
@@ -282,24 +312,32 @@ fn robot_covariance(view: &View, hypothesis: &Hypothesis) -> Option<Matrix6<f64>
         let sigma = if column < 3 { hypothesis.translation_m } else { hypothesis.rotation_rad };
         root.column_mut(column).scale_mut(sigma);
     }
-    Some(root * root.transpose())
+    Some(root)
 }
 
-fn sum_up(views: &[View], hypothesis: &Hypothesis) -> Option<Sums> {
+fn sum_up(views: &[View], hypothesis: &Hypothesis, smooth: Option<&SmoothError>) -> Option<Sums> {
     let n = views.first()?.rows.ncols() - 1;
-    let mut sums = DMatrix::zeros(n + 1, n + 1);
+    let smooth = smooth.filter(|_| hypothesis.smooth);
+    let n_s = smooth.map_or(0, SmoothError::coefficients);
+    let mut sums = DMatrix::zeros(n_s + n + 1, n_s + n + 1);
     let mut log_determinant = 0.0;
-    let mut whitened = DMatrix::zeros(6, n + 1);
-    for view in views {
+    // Coefficients of the smooth error come first: eliminating them is then the start of a factorisation.
+    let mut whitened = DMatrix::zeros(6, n_s + n + 1);
+    for (k, view) in views.iter().enumerate() {
         let mut covariance = view.pixel_covariance;
-        if let Some(robot) = robot_covariance(view, hypothesis) {
-            covariance += robot;
+        if hypothesis.joint_rad > 0.0 {
+            covariance += view.joints? * hypothesis.joint_rad.powi(2);
+        } else if let Some(root) = robot_root(view, hypothesis) {
+            covariance += root * root.transpose() * smooth.map_or(1.0, |s| s.own(k));
+            if let Some(smooth) = smooth {
+                smooth.fill(k, &root, &mut whitened, 0);
+            }
         }
         let factor = covariance.cholesky()?;
         let lower = factor.l_dirty();
         log_determinant += 2.0 * (0..6).map(|i| lower[(i, i)].ln()).sum::<f64>();
-        whitened.copy_from(&view.rows);
-        for column in 0..=n {
+        whitened.columns_mut(n_s, n + 1).copy_from(&view.rows);
+        for column in 0..=n_s + n {
             for i in 0..6 {
                 let mut value = whitened[(i, column)];
                 for j in 0..i {
@@ -310,7 +348,18 @@ fn sum_up(views: &[View], hypothesis: &Hypothesis) -> Option<Sums> {
         }
         sums.gemm_tr(1.0, &whitened, &whitened, 1.0);
     }
-    Some(Sums { products: sums, log_determinant })
+    if n_s == 0 {
+        return Some(Sums { products: sums, log_determinant });
+    }
+    // Integrate the coefficients out, each of variance one beforehand.
+    let own = sums.view((0, 0), (n_s, n_s)) + DMatrix::identity(n_s, n_s);
+    let factor = own.cholesky()?;
+    log_determinant += 2.0 * (0..n_s).map(|i| factor.l_dirty()[(i, i)].ln()).sum::<f64>();
+    let across = sums.view((0, n_s), (n_s, n + 1)).into_owned();
+    let explained = factor.l().solve_lower_triangular(&across)?;
+    let mut products = sums.view((n_s, n_s), (n + 1, n + 1)).into_owned();
+    products.gemm_tr(-1.0, &explained, &explained, 1.0);
+    Some(Sums { products, log_determinant })
 }
 
 fn linearise(

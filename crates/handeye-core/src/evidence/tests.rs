@@ -41,6 +41,7 @@ fn run_with(views: &[CompressedView], joints: Option<JointErrors>, hypotheses: &
         prior: WeakPrior::default(),
         camera_prior: DMatrix::zeros(0, 0),
         joints,
+        smooth: None,
         linearisations: 4,
     };
     estimate(&views, &variances, hypotheses, (start.x, start.y), &options).unwrap()
@@ -190,8 +191,13 @@ fn joint_errors_that_do_not_fit_are_refused() {
     let views: Vec<&CompressedView> = views.iter().collect();
     let try_with = |joints: Option<JointErrors>| {
         let camera_prior = DMatrix::zeros(0, 0);
-        let options =
-            EvidenceOptions { prior: WeakPrior::default(), camera_prior, joints, linearisations: 2 };
+        let options = EvidenceOptions {
+            prior: WeakPrior::default(),
+            camera_prior,
+            joints,
+            smooth: None,
+            linearisations: 2,
+        };
         estimate(&views, &[0.01; 4], &joint_grid(), (cell.x, cell.y), &options)
     };
     assert!(try_with(Some(arm(1, 4))).is_ok());
@@ -199,4 +205,64 @@ fn joint_errors_that_do_not_fit_are_refused() {
     assert!(try_with(Some(arm(1, 3))).is_err());
     assert!(try_with(Some(JointErrors { free: vec![5], ..arm(1, 4) })).is_err());
     assert!(try_with(Some(JointErrors { scales: vec![0.0; 5], ..arm(1, 4) })).is_err());
+}
+
+/// Half of the views in one posture, half in another: what a smooth error makes of them.
+#[test]
+fn smooth_errors_are_told_from_white_ones_and_widen_the_region() {
+    let prior = LevelPrior { smooth_odds: SMOOTH_ODDS, ..LevelPrior::default() };
+    let hypotheses = prior.grid_of(&[Side::Left, Side::Right]);
+    let total: f64 = hypotheses.iter().map(|h| h.log_prior.exp()).sum();
+    assert!((total - 1.0).abs() < 1e-12);
+    // Four postures, each taken five times.
+    let group = |k: usize| k / 5;
+    let likeness = DMatrix::from_fn(20, 20, |i, j| {
+        if i == j { 1.0 } else { (-0.5 * (group(i) as f64 - group(j) as f64).powi(2)).exp() }
+    });
+    let smooth = SmoothError::new(&likeness).unwrap();
+    let probability = |shared: bool, seed: u64| {
+        let cell = Cell::new(seed, 20);
+        let mut random = Random::new(seed);
+        let twists: Vec<Vector6<f64>> =
+            (0..20).map(|_| Vector6::from_fn(|_, _| 2e-3 * random.normal())).collect();
+        let reported: Vec<Se3> = cell
+            .motions
+            .iter()
+            .enumerate()
+            .map(|(k, a)| Se3::exp(&twists[if shared { group(k) } else { k }]) * *a)
+            .collect();
+        let views = compressed(&cell, &reported, 0.1, seed);
+        let white = run(&views);
+        let views: Vec<&CompressedView> = views.iter().collect();
+        let variances = shrunk_variances(&views, 20.0, 1e-12);
+        let options = EvidenceOptions {
+            prior: WeakPrior::default(),
+            camera_prior: DMatrix::zeros(0, 0),
+            joints: None,
+            smooth: Some(smooth.clone()),
+            linearisations: 4,
+        };
+        let posterior = estimate(&views, &variances, &hypotheses, (white.x, white.y), &options).unwrap();
+        let moved = (posterior.x * white.x.inverse()).log().amax();
+        assert!(moved < 1e-6, "the answer stays that of white errors: {moved}");
+        let wider = posterior.covariance.fixed_view::<6, 6>(0, 0).trace()
+            / white.covariance.fixed_view::<6, 6>(0, 0).trace();
+        let weights = hypotheses.iter().zip(&posterior.weights);
+        (weights.filter(|(h, _)| h.smooth).map(|(_, w)| w).sum::<f64>(), wider)
+    };
+    for seed in 0..5 {
+        let (smooth, wider) = probability(true, seed);
+        assert!(smooth > 0.9 && wider > 1.5, "{smooth} {wider}");
+        let (smooth, wider) = probability(false, seed);
+        assert!(smooth < 0.1 && wider < 1.3, "{smooth} {wider}");
+    }
+}
+
+#[test]
+fn likenesses_that_are_none_are_refused() {
+    assert!(SmoothError::new(&DMatrix::from_element(2, 2, 1.0)).is_ok());
+    assert!(SmoothError::new(&DMatrix::from_row_slice(2, 2, &[1.0, 0.5, 0.4, 1.0])).is_err());
+    assert!(SmoothError::new(&DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 0.0, 1.0])).is_err());
+    assert!(SmoothError::new(&DMatrix::from_row_slice(2, 2, &[1.0, 1.5, 1.5, 1.0])).is_err());
+    assert!(SmoothError::new(&DMatrix::from_element(2, 3, 1.0)).is_err());
 }
