@@ -54,7 +54,7 @@ class Noise:
     evidence
         Posterior probability of each side that was compared.
     smooth_probability
-        Posterior probability that the robot's error changes smoothly with its posture, and is not another in each
+        Posterior probability that the robot's error changes smoothly with its posture, not from view to
         view; the covariance counts that, and grows.
     """
 
