@@ -71,7 +71,8 @@ def camera_prior(camera: Camera, inflation: float = CAMERA_INFLATION) -> CameraP
 def posture_likeness(measurements: Measurements) -> FloatArray:
     """Return how far a smooth error of the robot is the same in two views, (K, K) correlations.
 
-    It falls off as a Gaussian of the distance and of the angle between the flange's poses.
+    It falls off as a Gaussian of the distance and of the angle between the flange's poses. Of angles all
+    around that need not be a correlation: one near it without negative eigenvalues is taken.
     """
     poses = np.array([view.T_base_flange.matrix for view in measurements.views]).reshape(-1, 4, 4)
     positions, rotations = poses[:, :3, 3], poses[:, :3, :3]
@@ -79,6 +80,12 @@ def posture_likeness(measurements: Measurements) -> FloatArray:
     cosines = (np.einsum("iab,jab->ij", rotations, rotations) - 1) / 2
     angles = np.arccos(np.clip(cosines, -1, 1))
     likeness = np.exp(-0.5 * (squared_m2 / LIKENESS_M**2 + (angles / LIKENESS_RAD) ** 2))
+    values, vectors = np.linalg.eigh(likeness)
+    if len(values) and values[0] < 0:
+        likeness = (vectors * values.clip(0)) @ vectors.T
+        deviations = np.sqrt(np.diag(likeness))
+        likeness /= np.outer(deviations, deviations)
+        likeness = 0.5 * (likeness + likeness.T)
     np.fill_diagonal(likeness, 1.0)
     return likeness
 
