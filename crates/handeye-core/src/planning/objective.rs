@@ -52,16 +52,15 @@ impl Objective {
     /// `phi` and its gradient, a positive semi-definite matrix `G` with `d phi = tr(G d Lambda)`.
     pub(super) fn gradient(&self, information: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
         let n = information.nrows();
-        let covariance = inverse(information)?;
+        let (covariance, whole) = inverse_and_log_determinant(information)?;
         match self {
-            Self::Entropy => Some((log_determinant(information)?, covariance)),
+            Self::Entropy => Some((whole, covariance)),
             Self::EntropyHandEye => {
-                let rest = nuisance(information);
-                let value = log_determinant(information)? - log_determinant(&rest)?;
+                let (inverse_of_rest, of_rest) = inverse_and_log_determinant(&nuisance(information))?;
                 let mut gradient = covariance;
                 let mut block = gradient.view_mut((6, 6), (n - 6, n - 6));
-                block -= inverse(&rest)?;
-                Some((value, gradient))
+                block -= inverse_of_rest;
+                Some((whole - of_rest, gradient))
             }
             Self::ToolPoint(q) => {
                 let columns = covariance.columns(0, 6).into_owned();
@@ -104,12 +103,17 @@ fn log_determinant(m: &DMatrix<f64>) -> Option<f64> {
 }
 
 fn inverse(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    inverse_and_log_determinant(m).map(|(inverse, _)| inverse)
+}
+
+fn inverse_and_log_determinant(m: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
     let (factor, scale) = scaled(m)?;
+    let pivots: f64 = (0..m.nrows()).map(|i| (factor.l_dirty()[(i, i)] / scale[i]).ln()).sum();
     let mut inverse = factor.inverse();
     for i in 0..m.nrows() {
         for j in 0..m.nrows() {
             inverse[(i, j)] *= scale[i] * scale[j];
         }
     }
-    Some(inverse)
+    Some((inverse, 2.0 * pivots))
 }
