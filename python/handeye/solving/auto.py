@@ -77,9 +77,8 @@ def posture_likeness(measurements: Measurements) -> FloatArray:
     poses = np.array([view.T_base_flange.matrix for view in measurements.views]).reshape(-1, 4, 4)
     positions, rotations = poses[:, :3, 3], poses[:, :3, :3]
     squared_m2 = ((positions[:, np.newaxis] - positions) ** 2).sum(axis=2)
-    cosines = (np.einsum("iab,jab->ij", rotations, rotations) - 1) / 2
-    angles = np.arccos(np.clip(cosines, -1, 1))
-    likeness = np.exp(-0.5 * (squared_m2 / LIKENESS_M**2 + (angles / LIKENESS_RAD) ** 2))
+    squared_chord = np.maximum(3 - np.einsum("iab,jab->ij", rotations, rotations), 0)
+    likeness = np.exp(-0.5 * (squared_m2 / LIKENESS_M**2 + squared_chord / LIKENESS_RAD**2))
     values, vectors = np.linalg.eigh(likeness)
     if len(values) and values[0] < 0:
         likeness = (vectors * values.clip(0)) @ vectors.T
