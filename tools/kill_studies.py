@@ -1,6 +1,9 @@
 """Run a study on a local Dask cluster, kill a worker and the client, resume it, and compare with one process.
 
 .venv/bin/python tools/kill_studies.py --trials 1000
+
+The study is that of coverage with the paper's model, in cells with four views of a small board: a trial takes
+some milliseconds.
 """
 
 import argparse
@@ -16,71 +19,89 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from clusters import local_cluster
-from handeye.evaluation.checkpoint import FILE
-from handeye.evaluation.studies.coverage import CASES
+from handeye.evaluation.checkpoint import FILE, Checkpoint
+from handeye.evaluation.cluster import Cluster
+from handeye.evaluation.parallel import Workers
+from handeye.evaluation.simulate import CellOptions
+from handeye.evaluation.studies.coverage import CASES, study_coverage
+from handeye.types import Chessboard
+from handeye.types.calibration import ModelName
 
 BYTES_PER_TRIAL = 100
-COMMAND = "import sys; from handeye.cli import main; sys.exit(main())"
+CELL = CellOptions(views=(4, 4), calibration_views=4, target=Chessboard(4, 5, 0.03))
 
 
-def study(folder: Path, options: argparse.Namespace, *more: str) -> list[str]:
-    """The command of the study, its answer in a folder."""
-    command = [sys.executable, "-c", COMMAND, "study", "coverage", "--model", options.model]
-    return [*command, "--trials", str(options.trials), "--output", str(folder), *more]
+def study(answer: Path, trials: int, kept: Path | None, scheduler: str | None) -> None:
+    """Do the study in this process and write its answer."""
+    workers: Workers = 1 if scheduler is None else Cluster(scheduler)
+    if kept is not None:
+        workers = Checkpoint(kept, workers)
+    found = study_coverage(model=ModelName.PAPER, cell=CELL, trials=trials, workers=workers)
+    answer.write_text(json.dumps({case.name: repr(runs) for case, runs in found.kinds.items()}))
 
 
-def seconds(command: list[str]) -> float:
+def command(answer: Path, trials: int, *more: str) -> list[str]:
+    """The same in a process of its own."""
+    return [sys.executable, __file__, "--trials", str(trials), "--answer", str(answer), *more]
+
+
+def seconds(words: list[str]) -> float:
     """Run a command to its end."""
     began = time.monotonic()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(words, check=True)
     return time.monotonic() - began
-
-
-def main() -> int:
-    """Return 1 if the results differ."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--trials", type=int, default=1000, help="of each of the ten kinds of errors")
-    parser.add_argument("--model", default="paper", choices=["paper", "auto"])
-    options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        kept = folder / "kept"
-        on_cluster = ("--checkpoint", str(kept), "--scheduler")
-        with local_cluster(folder) as cluster:
-            command = study(folder / "cluster", options, *on_cluster, cluster.address)
-            began = time.monotonic()
-            client = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-            total = options.trials * len(CASES)
-            # A fifth of the way a worker dies, half of the way the client.
-            wait_for(kept / FILE, 0.2 * total)
-            cluster.workers[0].kill()
-            wait_for(kept / FILE, 0.5 * total)
-            client.send_signal(signal.SIGKILL)
-            client.wait()
-            until_kill = time.monotonic() - began
-            done = (kept / FILE).stat().st_size
-            print(f"{total} trials; a worker killed, and the client after {until_kill:.0f} s", flush=True)
-            rest = seconds(command)
-            print(f"resumed with one worker: {rest:.0f} s more", flush=True)
-            share = done / (kept / FILE).stat().st_size
-            print(
-                f"kept over the kill: {share:.0%} of {(kept / FILE).stat().st_size / 1e6:.2f} MB", flush=True
-            )
-        again = seconds(study(folder / "again", options, "--checkpoint", str(kept)))
-        print(f"once more from what is kept: {again:.1f} s", flush=True)
-        alone = seconds(study(folder / "alone", options, "--workers", "1"))
-        print(f"one process: {alone:.0f} s", flush=True)
-        places = ("cluster", "again", "alone")
-        found = [json.loads((folder / place / "coverage.json").read_text()) for place in places]
-    same = found[0] == found[1] == found[2]
-    print("the same to the bit" if same else "DIFFERENT")
-    return 0 if same else 1
 
 
 def wait_for(file: Path, trials: float) -> None:
     """Wait until about so many trials are kept."""
     while not file.exists() or file.stat().st_size < trials * BYTES_PER_TRIAL:
         time.sleep(0.1)
+
+
+def experiment(trials: int, folder: Path) -> bool:
+    """Kill and resume; whether the answers are the same."""
+    total = trials * len(CASES)
+    answers = [folder / name for name in ("cluster", "again", "alone")]
+    file = folder / "kept" / FILE
+    keep = ("--checkpoint", str(file.parent))
+    with local_cluster(folder) as cluster:
+        words = command(answers[0], trials, *keep, "--scheduler", cluster.address)
+        began = time.monotonic()
+        client = subprocess.Popen(words)
+        # A fifth of the way a worker dies, half of the way the client.
+        wait_for(file, 0.2 * total)
+        cluster.workers[0].kill()
+        wait_for(file, 0.5 * total)
+        client.send_signal(signal.SIGKILL)
+        client.wait()
+        until = time.monotonic() - began
+        size = file.stat().st_size
+        print(f"{total} trials; one of two workers killed, and the client after {until:.0f} s", flush=True)
+        rest = seconds(words)
+        share = size / file.stat().st_size
+        print(f"kept over the kill: {share:.0%}; resumed with one worker: {rest:.0f} s more", flush=True)
+    again = seconds(command(answers[1], trials, *keep))
+    print(f"once more from what is kept, {file.stat().st_size / 1e6:.2f} MB: {again:.1f} s", flush=True)
+    alone = seconds(command(answers[2], trials))
+    print(f"one process: {alone:.0f} s", flush=True)
+    return len({answer.read_text() for answer in answers}) == 1
+
+
+def main() -> int:
+    """Return 1 if the results differ."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--trials", type=int, default=1000, help="of each of the ten kinds of errors")
+    parser.add_argument("--answer", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--checkpoint", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--scheduler", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.answer is not None:
+        study(options.answer, options.trials, options.checkpoint, options.scheduler)
+        return 0
+    with tempfile.TemporaryDirectory() as name:
+        same = experiment(options.trials, Path(name))
+    print("the same to the bit" if same else "DIFFERENT")
+    return 0 if same else 1
 
 
 if __name__ == "__main__":
