@@ -383,8 +383,8 @@ class Compressed:
 
         `levels` (metres, radians) gives them instead; then `sides` are all that is compared. With `joints`
         noise of the joints is a further hypothesis, and their offsets are further parameters. With `likeness`
-        (K, K), the correlation of smooth errors between the views, errors that change smoothly with the posture
-        are further hypotheses.
+        (K, K), the correlation of smooth errors between the views, errors that change smoothly with the
+        posture are further hypotheses.
         """
 
 class Posterior:
