@@ -2,6 +2,8 @@
 //!
 //! Without arguments it names the cases. See `tools/count_instructions.py`.
 
+#![expect(clippy::disallowed_methods, clippy::disallowed_macros, reason = "a program, not the library")]
+
 use std::hint::black_box;
 
 use handeye_core::camera::{Camera, Feature, Lens};
@@ -71,7 +73,7 @@ impl Scene {
             x: self.random.transform(0.02, 0.05) * self.x,
             y: self.random.transform(0.02, 0.05) * self.y,
         };
-        let problem = Problem::new(self.camera.clone(), features, pixels, None, offsets, motions);
+        let problem = Problem::new(self.camera, features, pixels, None, offsets, motions);
         (problem.expect("consistent"), start)
     }
 }
@@ -143,7 +145,9 @@ const CASES: [Case; 11] = [
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     if arguments.len() == 1 {
-        CASES.iter().for_each(|(name, _)| println!("{name}"));
+        for (name, _) in CASES {
+            println!("{name}");
+        }
         return;
     }
     let [_, name, repeats] = &arguments[..] else { panic!("counted CASE REPEATS") };
