@@ -185,7 +185,9 @@ impl LevelPrior {
             }
         }
         let total = levels.iter().map(|l| l.2.exp()).sum::<f64>().ln();
-        levels.iter_mut().for_each(|l| l.2 -= total);
+        for level in &mut levels {
+            level.2 -= total;
+        }
         levels
     }
 
