@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from handeye.solving.auto import LIKENESS_M, LIKENESS_RAD, posture_likeness
+from handeye.solving.auto import LIKENESS_CHORD, LIKENESS_M, posture_likeness
 from handeye.types import Pose
 
 
@@ -16,7 +16,8 @@ def likeness(poses: list[Pose]) -> Any:
 
 
 def test_it_falls_off_with_distance_and_angle() -> None:
-    turned = Pose.exp([LIKENESS_M, 0, 0, 0, 0, 0]) @ Pose.exp([0, 0, 0, 0, LIKENESS_RAD, 0])
+    angle = 2 * np.arcsin(LIKENESS_CHORD / 2)
+    turned = Pose.exp([LIKENESS_M, 0, 0, 0, 0, 0]) @ Pose.exp([0, 0, 0, 0, angle, 0])
     found = likeness([Pose.identity(), Pose.exp([LIKENESS_M, 0, 0, 0, 0, 0]), turned])
     assert found[0, 1] == pytest.approx(np.exp(-0.5))
     assert found[1, 2] == pytest.approx(np.exp(-0.5))

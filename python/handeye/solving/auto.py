@@ -30,8 +30,8 @@ CAMERA_INFLATION = 1.1
 LEAST_PIXEL_SIGMA = 0.01
 # Degrees of freedom below which regions would have no useful quantile.
 FEWEST_DEGREES_OF_FREEDOM = 4.5
-# Poses of the flange further apart than this have little of a smooth error in common.
-LIKENESS_M, LIKENESS_RAD = 1.0, 2.0
+# Flange poses further apart than this have little of a smooth error in common; a chord of 2 is half a turn.
+LIKENESS_M, LIKENESS_CHORD = 1.0, 2.0
 # A mirrored pose is looked at where it fits less than this many times worse than the best.
 MIRROR_RATIO = 8.0
 # Without a covariance: relative focal length, principal point as a share of the width, coefficients.
@@ -71,20 +71,14 @@ def camera_prior(camera: Camera, inflation: float = CAMERA_INFLATION) -> CameraP
 def posture_likeness(measurements: Measurements) -> FloatArray:
     """Return how far a smooth error of the robot is the same in two views, (K, K) correlations.
 
-    It falls off as a Gaussian of the distance and of the angle between the flange's poses. Of angles all
-    around that need not be a correlation: one near it without negative eigenvalues is taken.
+    It falls off as a Gaussian of the distance between the flange's positions and of the chord between its
+    rotations, 2 sin(angle / 2); of the angle itself it would be no correlation.
     """
     poses = np.array([view.T_base_flange.matrix for view in measurements.views]).reshape(-1, 4, 4)
     positions, rotations = poses[:, :3, 3], poses[:, :3, :3]
     squared_m2 = ((positions[:, np.newaxis] - positions) ** 2).sum(axis=2)
     squared_chord = np.maximum(3 - np.einsum("iab,jab->ij", rotations, rotations), 0)
-    likeness = np.exp(-0.5 * (squared_m2 / LIKENESS_M**2 + squared_chord / LIKENESS_RAD**2))
-    values, vectors = np.linalg.eigh(likeness)
-    if len(values) and values[0] < 0:
-        likeness = (vectors * values.clip(0)) @ vectors.T
-        deviations = np.sqrt(np.diag(likeness))
-        likeness /= np.outer(deviations, deviations)
-        likeness = 0.5 * (likeness + likeness.T)
+    likeness = np.exp(-0.5 * (squared_m2 / LIKENESS_M**2 + squared_chord / LIKENESS_CHORD**2))
     np.fill_diagonal(likeness, 1.0)
     return likeness
 
