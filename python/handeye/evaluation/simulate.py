@@ -56,8 +56,7 @@ class CellOptions:
         Noise of the pixels per axis.
     rotation_sigma_deg, lever_m, translation_sigma_m
         Levels of the robot's white error per axis. An arm's error is mostly error of its joints times its
-        reach, so the translation's is the rotation's times a lever (about 3 m in the public sets of a real
-        arm), unless it is given.
+        reach, so the translation's is the rotation's times a lever, unless it is given.
     encoder_sigma_deg, offset_sigma_deg
         Levels of the error of the joint angles.
     length_sigma_m, twist_sigma_deg
@@ -72,8 +71,8 @@ class CellOptions:
     target: Target = TARGET
     views: tuple[int, int] = (8, 12)
     pixel_sigma_px: tuple[float, float] = (0.05, 0.2)
-    rotation_sigma_deg: tuple[float, float] = (0.003, 0.03)
-    lever_m: tuple[float, float] = (1.5, 6.0)
+    rotation_sigma_deg: tuple[float, float] = (0.005, 0.05)
+    lever_m: tuple[float, float] = (0.5, 2.0)
     translation_sigma_m: tuple[float, float] | None = None
     encoder_sigma_deg: tuple[float, float] = (0.003, 0.03)
     offset_sigma_deg: tuple[float, float] = (0.005, 0.05)

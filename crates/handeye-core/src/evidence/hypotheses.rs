@@ -155,14 +155,14 @@ impl Default for LevelPrior {
         Self {
             rotation_median_rad: 0.02_f64.to_radians(),
             rotation_spread: 2.0,
-            lever_median_m: 3.0,
+            lever_median_m: 1.0,
             lever_spread: 0.5,
             rotation_grid: (5e-4_f64.to_radians(), 0.3_f64.to_radians(), 12),
             lever_grid: (0.3, 10.0, 6),
             exact_probability: 1.0 / 3.0,
             smooth_odds: 0.0,
             smooth_rotation_grid: (1e-3_f64.to_radians(), 0.3_f64.to_radians(), 9),
-            smooth_lever_grid: (1.0, 6.0, 3),
+            smooth_lever_grid: (0.4, 2.5, 3),
         }
     }
 }
