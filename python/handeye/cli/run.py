@@ -33,10 +33,11 @@ from handeye.session.configuration import (
 from handeye.session.drivers import Person
 from handeye.session.entry import Entry
 from handeye.session.faults import FaultRates
-from handeye.session.loop import START_VIEWS, End, EndReason
+from handeye.session.loop import START_VIEWS, End, EndReason, Session
 from handeye.session.request import reach
 from handeye.session.simulated import usual_errors
 from handeye.session.starting import preview
+from handeye.session.store import SessionStore, read_settings
 from handeye.solving import Estimate
 from handeye.types import Mounting
 from handeye.types.calibration import MM_PER_M, ModelName
@@ -208,18 +209,21 @@ def run(
         raise UsageError("--session is missing", hint="name a folder to write, or look first with --dry-run")
     check_new_folder(session)
     loop, store = begin(prepared, session, None if common.json else _Progress())
+    return _answer(session, configuration, prepared, _driven(loop, store, prepared))
+
+
+def _driven(loop: Session, store: SessionStore, prepared: Prepared) -> End:
+    """Run a session to its end, tell it what was true, and let others open it."""
     try:
         end = loop.run()
         if prepared.truth is not None:
             store.reveal(prepared.truth)
     finally:
         store.close()
-    return _answer(session, configuration, prepared, end)
+    return end
 
 
 def _resumed(session: Path, person: Person, confirm: bool | None, *, as_json: bool) -> Answer:
-    from handeye.session.store import read_settings  # noqa: PLC0415
-
     configuration = Configuration.from_dict(read_settings(session).get("configuration"))
     loop, store, prepared = go_on(
         session,
@@ -227,13 +231,7 @@ def _resumed(session: Path, person: Person, confirm: bool | None, *, as_json: bo
         person=person,
         confirm=_confirm(confirm, configuration, person),
     )
-    try:
-        end = loop.run()
-        if prepared.truth is not None:
-            store.reveal(prepared.truth)
-    finally:
-        store.close()
-    return _answer(session, configuration, prepared, end)
+    return _answer(session, configuration, prepared, _driven(loop, store, prepared))
 
 
 def _described(robot: str) -> str:

@@ -9,9 +9,9 @@ from cyclopts import App, Parameter
 
 from handeye.cli.answer import Answer
 from handeye.cli.options import Common
-from handeye.cli.output import write_figure, write_json
+from handeye.cli.output import check_folder, write_figure, write_json
 from handeye.cli.progress import progress
-from handeye.errors import InputError, OutputError
+from handeye.errors import InputError
 from handeye.types.calibration import ModelName
 from handeye.types.mounting import Mounting
 
@@ -142,7 +142,7 @@ def table1(
     from handeye.evaluation.data import SIMULATED_SETS  # noqa: PLC0415 - help need not wait for it
     from handeye.evaluation.studies import study_table1  # noqa: PLC0415
 
-    _check_folder(trials.output)
+    check_folder(trials.output)
     count = trials.count(50)
     recordings = data.load(SIMULATED_SETS, trials.processes)
     with progress("Calibrating from random starts") as advance:
@@ -163,7 +163,7 @@ def table1(
         yield "table1", errors_figure(result.sets, panels, title)
 
     document = result.to_dict()
-    written = _write(trials.output, "table1", document, pictures)
+    written = write_results(trials.output, "table1", document, pictures)
 
     def show(console: "Console") -> None:
         from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
@@ -191,7 +191,7 @@ def curves(
     from handeye.evaluation.data import REAL_SETS, SIMULATED_SETS  # noqa: PLC0415
     from handeye.evaluation.studies import study_curves  # noqa: PLC0415
 
-    _check_folder(trials.output)
+    check_folder(trials.output)
     count = trials.count(50)
     recordings = data.load([*SIMULATED_SETS, *REAL_SETS], trials.processes)
     with progress("Calibrating from random starts") as advance:
@@ -212,7 +212,7 @@ def curves(
         yield "scatter", scatter_figure(result)
 
     document = result.to_dict()
-    written = _write(trials.output, "curves", document, pictures)
+    written = write_results(trials.output, "curves", document, pictures)
 
     def show(console: "Console") -> None:
         from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
@@ -244,7 +244,7 @@ def holdout(
     from handeye.evaluation.data import REAL_SETS  # noqa: PLC0415
     from handeye.evaluation.studies import study_holdout  # noqa: PLC0415
 
-    _check_folder(trials.output)
+    check_folder(trials.output)
     count = trials.count(50)
     recordings = data.load(REAL_SETS, trials.processes)
     with progress("Calibrating from random starts") as advance:
@@ -268,7 +268,7 @@ def holdout(
         yield "holdout", errors_figure(result.sets, panels, title)
 
     document = result.to_dict()
-    written = _write(trials.output, "holdout", document, pictures)
+    written = write_results(trials.output, "holdout", document, pictures)
 
     def show(console: "Console") -> None:
         from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
@@ -297,7 +297,7 @@ def injected(
     from handeye.evaluation.data import SIMULATED_SETS  # noqa: PLC0415
     from handeye.evaluation.studies import study_injected  # noqa: PLC0415
 
-    _check_folder(trials.output)
+    check_folder(trials.output)
     count = trials.count(50)
     recordings = data.load(SIMULATED_SETS[-1:], trials.processes)
     with progress("Calibrating from random starts") as advance:
@@ -310,7 +310,7 @@ def injected(
             progress=advance,
         )
     document = result.to_dict()
-    written = _write(trials.output, "injected", document, lambda: ())
+    written = write_results(trials.output, "injected", document, lambda: ())
 
     def show(console: "Console") -> None:
         from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
@@ -347,7 +347,7 @@ def coverage(
     from handeye.evaluation.simulate import CellOptions  # noqa: PLC0415
     from handeye.evaluation.studies import study_coverage  # noqa: PLC0415
 
-    _check_folder(trials.output)
+    check_folder(trials.output)
     with progress("Calibrating simulated cells") as advance:
         result = study_coverage(
             model=trials.model,
@@ -364,7 +364,7 @@ def coverage(
         yield "coverage", coverage_figure(result)
 
     document = result.to_dict()
-    written = _write(trials.output, "coverage", document, pictures)
+    written = write_results(trials.output, "coverage", document, pictures)
 
     def show(console: "Console") -> None:
         from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
@@ -401,7 +401,7 @@ def mistakes(
         raise InputError(
             f"no mistake {unknown[0]!r}", code="unknown_kind", hint=f"there are {', '.join(known)}"
         )
-    _check_folder(trials.output)
+    check_folder(trials.output)
     with progress("Calibrating simulated cells") as advance:
         result = study_mistakes(
             kinds=[Mistake(kind) for kind in kinds or known],
@@ -412,7 +412,7 @@ def mistakes(
             progress=advance,
         )
     document = result.to_dict()
-    written = _write(trials.output, "mistakes", document, lambda: ())
+    written = write_results(trials.output, "mistakes", document, lambda: ())
 
     def show(console: "Console") -> None:
         from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
@@ -424,24 +424,13 @@ def mistakes(
     return Answer(document, show)
 
 
-def _check_folder(path: Path | None) -> None:
-    """Refuse a folder that cannot be made, before the work rather than after it."""
-    if path is None:
-        return
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"{path}: cannot be made a folder ({(error.strerror or str(error)).lower()})"
-        ) from error
-
-
-def _write(
+def write_results(
     folder: Path | None,
     name: str,
     document: Mapping[str, Any],
     pictures: "Callable[[], Iterable[tuple[str, Figure]]]",
 ) -> list[Path]:
+    """Write the numbers of a study and its pictures into a folder, if one is asked for; return the files."""
     if folder is None:
         return []
     written = [folder / f"{name}.json"]

@@ -8,12 +8,9 @@ from cyclopts import Parameter
 
 from handeye.cli.answer import Answer
 from handeye.cli.options import Common
+from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import (
-    Trials,
-    _check_folder,  # pyright: ignore[reportPrivateUsage]
-    _write,  # pyright: ignore[reportPrivateUsage]
-)
+from handeye.cli.study import Trials, write_results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,7 +63,7 @@ def twin(
     from handeye.evaluation.studies.twin import MODELS, study_twin  # noqa: PLC0415 - help need not wait for it
     from handeye.evaluation.twin import TwinOptions  # noqa: PLC0415
 
-    _check_folder(output)
+    check_folder(output)
     with progress("Calibrating twins from random starts") as advance:
         result = study_twin(
             models=models or MODELS,
@@ -90,7 +87,7 @@ def twin(
                 yield "twin_scatter", scatter_figure(curves)
 
     document = result.to_dict()
-    written = _write(output, "twin", document, pictures)
+    written = write_results(output, "twin", document, pictures)
     return Answer(document, lambda console: _show(console, document, written))
 
 

@@ -4,9 +4,7 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
 from handeye.datasets.images import read_image
 from handeye.evaluation.cell_picture import (
@@ -20,18 +18,12 @@ from handeye.evaluation.cell_picture import (
 )
 from handeye.evaluation.closed_loop import ClosedLoop, camera_poses
 from handeye.evaluation.comparison import POLICIES
+from handeye.evaluation.picture_style import INK, POLICY_LOOKS, QUIET, light_grid, plain_ticks
 from handeye.robots import open_arm
 from handeye.session.loop import START_VIEWS
 from handeye.session.simulated import LENS, PARAMETERS, SIZE_PX, SimulationOptions
 from handeye.types import Camera, View
 
-# Colours that colour-blind readers tell apart (Okabe and Ito), marks for print without colour.
-LOOKS = {
-    "next_best_view": ("next best view", "#0072B2", "o"),
-    "random": ("random", "#D98200", "s"),
-    "max_distance": ("max distance", "#009E73", "^"),
-}
-_INK, _QUIET = "#222222", "#555555"
 _TICKS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10]
 
 
@@ -67,12 +59,12 @@ def _cell(axis: Axes, shown: ClosedLoop) -> None:
     draw_arm(axis, eye, arm, joints[-1])
     for policy in reversed(POLICIES):
         strong = policy == POLICIES[0]
-        colour = LOOKS[policy][1]
+        colour = POLICY_LOOKS[policy].colour
         draw_path(axis, eye, poses[policy][START_VIEWS - 1 :], colour, "-" if strong else ":")
         for pose in poses[policy][START_VIEWS:]:
             draw_camera(axis, eye, pose, camera, colour, strong=strong)
     for pose in poses[POLICIES[0]][:START_VIEWS]:
-        draw_camera(axis, eye, pose, camera, _QUIET, strong=False)
+        draw_camera(axis, eye, pose, camera, QUIET, strong=False)
     plain_axis(axis)
     axis.set_anchor("W")
     added = shown.options.added_views
@@ -86,16 +78,16 @@ def _cell(axis: Axes, shown: ClosedLoop) -> None:
 def _errors(axis: Axes, shown: ClosedLoop) -> None:
     views = np.array(shown.options.views)
     for policy in POLICIES:
-        name, colour, mark = LOOKS[policy]
+        look = POLICY_LOOKS[policy]
         values = shown.values(policy, "translation_mm")
-        axis.plot(views, values.T, color=colour, linewidth=0.7, alpha=0.22)
+        axis.plot(views, values.T, color=look.colour, linewidth=0.7, alpha=0.22)
         mean = values.mean(axis=0)
         axis.plot(
-            views, mean, color=colour, marker=mark, markersize=6, linewidth=2.2, zorder=3,
-            label=f"{name}: {mean[-1]:.2g} mm",
+            views, mean, color=look.colour, marker=look.mark, markersize=6, linewidth=2.2, zorder=3,
+            label=f"{look.label}: {mean[-1]:.2g} mm",
         )  # fmt: skip
     axis.set_yscale("log")
-    _plain(axis.yaxis)
+    plain_ticks(axis.yaxis, _TICKS)
     axis.set_xticks(views)
     axis.set_xlabel(f"views taken, the first {START_VIEWS} the same for all", loc="left")
     axis.legend(frameon=False, loc="upper right", fontsize=9.5)
@@ -105,7 +97,7 @@ def _errors(axis: Axes, shown: ClosedLoop) -> None:
         "What choosing views is worth",
         f"error against the hidden truth in mm, mean of {cells} cells",
     )
-    _grid(axis)
+    light_grid(axis)
 
 
 def _promises(axis: Axes, shown: ClosedLoop) -> None:
@@ -121,7 +113,7 @@ def _promises(axis: Axes, shown: ClosedLoop) -> None:
     axis.fill_between(line, 0 * line + low, line, color="0.5", alpha=0.12, linewidth=0)
     axis.plot(line, line, color="0.45", linewidth=1)
     for policy in reversed(POLICIES):
-        _, colour, mark = LOOKS[policy]
+        _, colour, mark, _ = POLICY_LOOKS[policy]
         x, y = shown.values(policy, "within_mm"), shown.values(policy, "translation_mm")
         axis.plot(
             x[:, :-1].ravel(),
@@ -137,16 +129,16 @@ def _promises(axis: Axes, shown: ClosedLoop) -> None:
     axis.set_yscale("log")
     axis.set_xlim(low, high)
     axis.set_ylim(low, high)
-    _plain(axis.xaxis)
-    _plain(axis.yaxis)
+    plain_ticks(axis.xaxis, _TICKS)
+    plain_ticks(axis.yaxis, _TICKS)
     axis.set_xlabel("promised: within so many mm with 95 %", loc="left")
     _title(axis, "Whether it can be trusted", "error made in mm; grey: promise kept")
-    _grid(axis)
+    light_grid(axis)
 
 
 def _picture(axis: Axes, shown: ClosedLoop, view: View, number: int) -> None:
     chosen = number > START_VIEWS
-    colour = LOOKS[POLICIES[0]][1] if chosen else _QUIET
+    colour = POLICY_LOOKS[POLICIES[0]].colour if chosen else QUIET
     image = read_image(shown.folder / str(view.image))
     height, width = image.shape[:2]
     axis.imshow(
@@ -163,27 +155,6 @@ def _picture(axis: Axes, shown: ClosedLoop, view: View, number: int) -> None:
     )
 
 
-def _plain(scale: Axis) -> None:
-    scale.set_major_locator(FixedLocator(_TICKS))
-    scale.set_major_formatter(FuncFormatter(_written))
-    scale.set_minor_locator(NullLocator())
-    scale.set_minor_formatter(NullFormatter())
-
-
-def _written(value: float, _: int | None = None) -> str:
-    return f"{value:g}"
-
-
-def _grid(axis: Axes) -> None:
-    axis.grid(visible=True, which="major", color="0.88", linewidth=0.8)
-    axis.set_axisbelow(True)
-    for side in ("top", "right"):
-        axis.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axis.spines[side].set_color("0.6")
-    axis.tick_params(colors="#444444", length=0)
-
-
 def _title(axis: Axes, title: str, subtitle: str) -> None:
-    axis.set_title(title, loc="left", fontsize=13, fontweight="bold", color=_INK, pad=22)
-    axis.text(0, 1.02, subtitle, transform=axis.transAxes, fontsize=8.8, color=_QUIET)
+    axis.set_title(title, loc="left", fontsize=13, fontweight="bold", color=INK, pad=22)
+    axis.text(0, 1.02, subtitle, transform=axis.transAxes, fontsize=8.8, color=QUIET)

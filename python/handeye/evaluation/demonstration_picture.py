@@ -2,35 +2,20 @@
 # matplotlib is typed only in part.
 # pyright: reportUnknownMemberType=false
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
 from handeye.evaluation.demonstration import Curve, Demonstration, Way
+from handeye.evaluation.picture_style import INK, POLICY_LOOKS, QUIET, Look, light_grid, plain_ticks
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
 
-
-@dataclass(frozen=True)
-class _Look:
-    label: str
-    colour: str
-    mark: str
-    line: str = "-"
-
-
-# Colours that colour-blind readers tell apart (Okabe and Ito), marks for print without colour.
 _GREY = "#6b6b6b"
 _LOOKS = {
-    Way("next_best_view"): _Look("next best view", "#0072B2", "o"),
-    Way("max_distance"): _Look("max distance", "#009E73", "^"),
-    Way("random"): _Look("random", "#D98200", "s"),
-    Way("next_best_view", ModelName.PAPER): _Look("next best, paper's model", _GREY, "D", "--"),
+    **{Way(policy): look for policy, look in POLICY_LOOKS.items()},
+    Way("next_best_view", ModelName.PAPER): Look("next best, paper's model", _GREY, "D", "--"),
 }
 # Policies whose single starts are drawn too: all of them would hide each other.
 _SINGLY = (Way("next_best_view"), Way("random"))
@@ -38,7 +23,6 @@ _TICKS = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50]
 _FEW_TICKS = [0.001, 0.01, 0.1, 1, 10, 100]
 # Of a line of text, in heights of the axis.
 _LABEL_HEIGHT = 0.05
-_INK = "#222222"
 
 
 def demonstration_figure(shown: Demonstration) -> Figure:
@@ -53,7 +37,7 @@ def demonstration_figure(shown: Demonstration) -> Figure:
 
 def _errors(axis: Axes, shown: Demonstration) -> None:
     views = np.array(shown.views)
-    ends: list[tuple[float, _Look]] = []
+    ends: list[tuple[float, Look]] = []
     for way, look in _LOOKS.items():
         values = shown.curves[way].translation_mm
         mean = values.mean(axis=0)
@@ -64,7 +48,7 @@ def _errors(axis: Axes, shown: Demonstration) -> None:
         )
         ends.append((float(mean[-1]), look))
     axis.set_yscale("log")
-    _plain_ticks(axis.yaxis, _TICKS)
+    plain_ticks(axis.yaxis, _TICKS)
     low, high = axis.get_ylim()
     gap = _LABEL_HEIGHT * float(np.log(high / low))
     for (value, look), height in zip(ends, _spread([value for value, _ in ends], gap), strict=True):
@@ -105,8 +89,8 @@ def _honesty(axis: Axes, shown: Demonstration) -> None:
     axis.set_yscale("log")
     axis.set_xlim(low, high)
     axis.set_ylim(low, high)
-    _plain_ticks(axis.xaxis, _FEW_TICKS)
-    _plain_ticks(axis.yaxis, _FEW_TICKS)
+    plain_ticks(axis.xaxis, _FEW_TICKS)
+    plain_ticks(axis.yaxis, _FEW_TICKS)
     axis.set_xlabel("error predicted (one standard deviation, mm)", loc="left")
     _title(axis, "Whether it can be trusted", "error made in mm; grey: within 3 times that predicted")
     axis.text(0.97, 0.05, "noise from the data (default)", color=_LOOKS[chosen].colour, ha="right",
@@ -120,26 +104,9 @@ def _both(curve: Curve) -> FloatArray:
 
 
 def _title(axis: Axes, title: str, subtitle: str) -> None:
-    axis.set_title(title, loc="left", fontsize=13, fontweight="bold", color=_INK, pad=24)
-    axis.text(0, 1.025, subtitle, transform=axis.transAxes, fontsize=9.5, color="#555555")
-    axis.grid(visible=True, which="major", color="0.88", linewidth=0.8)
-    axis.set_axisbelow(True)
-    for side in ("top", "right"):
-        axis.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axis.spines[side].set_color("0.6")
-    axis.tick_params(colors="#444444", length=0)
-
-
-def _plain_ticks(scale: Axis, ticks: list[float]) -> None:
-    scale.set_major_locator(FixedLocator(ticks))
-    scale.set_major_formatter(FuncFormatter(_plain))
-    scale.set_minor_locator(NullLocator())
-    scale.set_minor_formatter(NullFormatter())
-
-
-def _plain(value: float, _: int | None = None) -> str:
-    return f"{value:g}"
+    axis.set_title(title, loc="left", fontsize=13, fontweight="bold", color=INK, pad=24)
+    axis.text(0, 1.025, subtitle, transform=axis.transAxes, fontsize=9.5, color=QUIET)
+    light_grid(axis)
 
 
 def _spread(values: list[float], gap: float) -> list[float]:

@@ -10,15 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from handeye.evaluation.comparison import POLICIES, SetResult
+from handeye.evaluation.picture_style import POLICY_LOOKS
 from handeye.evaluation.studies.coverage import Coverage
 from handeye.evaluation.studies.curves import Curves, correlations, scatters
 
-# Colours that colour-blind readers tell apart (Okabe and Ito), and marks for print without colour.
-_STYLES = {
-    "next_best_view": ("next best view", "#0072B2", "o"),
-    "random": ("random", "#E69F00", "s"),
-    "max_distance": ("max distance", "#009E73", "^"),
-}
 _PANELS = (
     ("entropy_nats", "entropy (nats)", False),
     ("rmse_px", "held-out RMSE (px)", True),
@@ -58,7 +53,7 @@ def curves_figure(curves: Curves, result: SetResult) -> Figure:
 
 
 def _curve(axis: Axes, curves: Curves, result: SetResult, policy: str, metric: str) -> None:
-    name, colour, mark = _STYLES[policy]
+    name, colour, mark, _ = POLICY_LOOKS[policy]
     mean = curves.mean(result, policy, metric)
     low, high = curves.band(result, policy, metric)
     added = np.arange(len(mean))
@@ -111,7 +106,7 @@ def _scatter(axis: Axes, result: SetResult) -> None:
     found = scatters(result)
     gains = np.array([g for s in found for g in s.predicted_gain_nats])
     reductions = np.array([r for s in found for r in s.rmse_reduction_px])
-    colour = _STYLES["next_best_view"][1]
+    colour = POLICY_LOOKS["next_best_view"].colour
     axis.scatter(gains, reductions, s=7, color=colour, alpha=0.35, linewidths=0, rasterized=True)
     axis.axhline(0, color="0.4", linewidth=0.8)
     _without_far_values(axis, reductions)
@@ -165,7 +160,7 @@ def errors_figure(sets: Sequence[SetResult], panels: Sequence[tuple[str, str]], 
 
 
 def _boxes(axis: Axes, sets: Sequence[SetResult], policy: str, metric: str, shift: float) -> None:
-    name, colour, _ = _STYLES[policy]
+    name, colour, *_ = POLICY_LOOKS[policy]
     values = [result.final(policy, metric) for result in sets]
     places = [i + shift for i in range(len(sets))]
     boxes = axis.boxplot(
@@ -206,7 +201,15 @@ def coverage_figure(coverage: Coverage) -> Figure:
         axis.axvline(ideal, color="0.4", linewidth=0.8)
         values = [table[kind.name][key] for kind in kinds]
         errors = [2 * table[kind.name][f"{key}_standard_error"] for kind in kinds]
-        axis.errorbar(values, places, xerr=errors, fmt="o", markersize=4.5, color="#0072B2", capsize=2)
+        axis.errorbar(
+            values,
+            places,
+            xerr=errors,
+            fmt="o",
+            markersize=4.5,
+            color=POLICY_LOOKS["next_best_view"].colour,
+            capsize=2,
+        )
         axis.set_yticks(places, [kind.name.replace("_", " ") for kind in kinds] if i == 0 else [])
         axis.set_ylim(-0.6, len(kinds) - 0.4)
         axis.set_xlabel(label)

@@ -16,17 +16,12 @@ from handeye.evaluation.cell_picture import (
     plain_axis,
 )
 from handeye.evaluation.comparison import POLICIES
+from handeye.evaluation.picture_style import POLICY_LOOKS
 from handeye.evaluation.studies.twin import Twin, trajectories
 from handeye.evaluation.twin import ARM, TARGET
 from handeye.robots import open_arm
 from handeye.types import Pose
 
-# Colours that colour-blind readers tell apart (Okabe and Ito), as in the other pictures.
-_LOOKS = {
-    "next_best_view": ("next best view", "#0072B2"),
-    "random": ("random", "#D98200"),
-    "max_distance": ("max distance", "#009E73"),
-}
 _MODELS = {"paper": "paper's model", "auto": "default", "auto_with_arm": "default,\narm described"}
 _PANELS = (
     ("relative_translation_mm", "relative translation (mm)"),
@@ -43,7 +38,7 @@ def table_figure(twin: Twin) -> Figure:
     for i, (metric, label) in enumerate(_PANELS):
         axis = figure.add_subplot(1, len(_PANELS), i + 1)
         for j, policy in enumerate(POLICIES):
-            name, colour = _LOOKS[policy]
+            name, colour, *_ = POLICY_LOOKS[policy]
             values = [twin.values(model, policy, metric) for model in twin.models]
             places = np.arange(len(values)) + 0.26 * (j - 1)
             means = [float(v.mean()) for v in values]
@@ -73,7 +68,9 @@ def trajectory_figure(twin: Twin, number: int = 0) -> Figure:
     for i, policy in enumerate(POLICIES):
         axis = figure.add_axes((0.005 + i * 0.333, 0.0, 0.323, 0.84))
         _trajectory(axis, twin, number, policy, paths)
-        axis.set_title(_LOOKS[policy][0], color=_LOOKS[policy][1], fontsize=12, fontweight="bold")
+        axis.set_title(
+            POLICY_LOOKS[policy].label, color=POLICY_LOOKS[policy].colour, fontsize=12, fontweight="bold"
+        )
     figure.text(
         0.01,
         0.945,
@@ -89,7 +86,7 @@ def _trajectory(axis: Axes, twin: Twin, number: int, policy: str, paths: dict[st
     truth = recording.truth
     if truth is None or truth.X is None or truth.Y is None:
         return
-    eye, colour = Eye(azimuth_deg=-60.0, elevation_deg=20.0), _LOOKS[policy][1]
+    eye, colour = Eye(azimuth_deg=-60.0, elevation_deg=20.0), POLICY_LOOKS[policy].colour
     everywhere = [recording.views[i].T_base_flange @ truth.X.inverse() for i in twin.sets[number].training]
     places = np.array([pose.translation for pose in everywhere])
     ground = np.vstack([places[:, :2], [[-0.1, 0.0]]])

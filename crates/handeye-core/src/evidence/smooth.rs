@@ -49,10 +49,10 @@ impl SmoothError {
         Ok(Self { functions, own })
     }
 
-    /// The correlation without the views that are not chosen.
+    /// Refuses another number of views than it was made for.
     ///
     /// # Errors
-    /// [`Error::InvalidInput`] if it was made for another number of views.
+    /// [`Error::InvalidInput`] if the number differs.
     pub(super) fn check(&self, views: usize) -> Result<(), Error> {
         if self.own.len() != views {
             return Err(Error::invalid(format!("{views} views, and a smooth error for {}", self.own.len())));

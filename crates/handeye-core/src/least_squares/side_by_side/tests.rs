@@ -74,34 +74,62 @@ fn one_by_one(
         .map(|mut engine| iterate(&mut engine, options, problem.pixels().len()))
 }
 
-fn close(a: &Solution, b: &Solution) -> Result<(), TestCaseError> {
-    prop_assert!(
-        (a.x.to_matrix() - b.x.to_matrix()).amax() < 1e-9,
-        "X: {} {}",
-        a.x.to_matrix(),
-        b.x.to_matrix()
-    );
-    prop_assert!((a.y.to_matrix() - b.y.to_matrix()).amax() < 1e-9);
+/// How far two solutions of one problem may differ.
+struct Apart {
+    /// Of `X` and `Y`, in standard deviations of the answer.
+    sigmas: f64,
+    /// Of everything else, relative.
+    relative: f64,
+}
+
+/// Evaluated at the same point: nothing but the order of the sums differs.
+const AT_ONE_POINT: Apart = Apart { sigmas: 1e-9, relative: 1e-9 };
+
+/// Iterated until converged: where exactly an iteration stops may differ within the criterion of convergence.
+const AT_THE_OPTIMUM: Apart = Apart { sigmas: 1e-3, relative: 1e-4 };
+
+fn close(a: &Solution, b: &Solution, apart: &Apart) -> Result<(), TestCaseError> {
+    let apart_x = (a.x * b.x.inverse()).log();
+    let apart_y = (a.y * b.y.inverse()).log();
+    for i in 0..6 {
+        let sigmas = apart_x[i].abs() * b.information[(i, i)].sqrt();
+        prop_assert!(
+            sigmas <= apart.sigmas,
+            "X {i}: {sigmas} sigmas, {} {}",
+            a.x.to_matrix(),
+            b.x.to_matrix()
+        );
+        let sigmas = apart_y[i].abs() * b.information[(6 + i, 6 + i)].sqrt();
+        prop_assert!(
+            sigmas <= apart.sigmas,
+            "Y {i}: {sigmas} sigmas, {} {}",
+            a.y.to_matrix(),
+            b.y.to_matrix()
+        );
+    }
+    let relative = apart.relative;
     prop_assert!((a.initial_cost - b.initial_cost).abs() <= 1e-11 * b.initial_cost);
     prop_assert!((a.cost - b.cost).abs() <= 1e-10 * b.cost, "cost {} {}", a.cost, b.cost);
     for i in 0..12 {
         for j in 0..12 {
             let scale = (b.information[(i, i)] * b.information[(j, j)]).sqrt();
             let difference = a.information[(i, j)] - b.information[(i, j)];
-            prop_assert!(difference.abs() <= 1e-9 * scale, "information {i} {j}: {}", difference / scale);
+            prop_assert!(difference.abs() <= relative * scale, "information {i} {j}: {}", difference / scale);
         }
     }
-    prop_assert!((&a.prior_information - &b.prior_information).amax() <= 1e-9 * b.prior_information.amax());
+    prop_assert!(
+        (&a.prior_information - &b.prior_information).amax() <= relative * b.prior_information.amax()
+    );
     let of_determinant = (a.correction_log_determinant - b.correction_log_determinant).abs();
-    prop_assert!(of_determinant <= 1e-9 * b.correction_log_determinant.abs());
+    prop_assert!(of_determinant <= relative * b.correction_log_determinant.abs());
     prop_assert_eq!(a.views.len(), b.views.len());
     for (a, b) in a.views.iter().zip(&b.views) {
         prop_assert_eq!(a.view, b.view);
-        prop_assert!((a.rmse_px - b.rmse_px).abs() <= 1e-8 * b.rmse_px);
-        prop_assert!((a.cost - b.cost).abs() <= 1e-8 * b.cost);
-        prop_assert!((a.correction - b.correction).amax() <= 1e-9);
-        prop_assert!((a.correction_cost - b.correction_cost).abs() <= 1e-7 * (1.0 + b.correction_cost));
-        prop_assert!((a.pose.to_matrix() - b.pose.to_matrix()).amax() < 1e-9);
+        prop_assert!((a.rmse_px - b.rmse_px).abs() <= relative * b.rmse_px);
+        prop_assert!((a.cost - b.cost).abs() <= relative * b.cost);
+        prop_assert!((a.correction - b.correction).amax() <= 10.0 * relative * b.correction.amax());
+        prop_assert!((a.correction_cost - b.correction_cost).abs() <= relative * (1.0 + b.correction_cost));
+        prop_assert!((a.pose.to_matrix() - b.pose.to_matrix()).amax() <= relative);
     }
     Ok(())
 }
@@ -147,15 +175,20 @@ proptest! {
             });
         }
         let start = cell.start(0.02, 0.01, seed);
-        // The optimum is the same; where exactly an iteration stops need not be.
         let options = Options { loss, cost_tolerance: 1e-14, ..Options::default() };
+        let untouched = Options { max_iterations: 0, ..options };
         let expected = one_by_one(&problem, &model, &start, &views, &options);
+        let at_start = one_by_one(&problem, &model, &start, &views, &untouched);
         for unit in VectorUnit::ALL {
+            let found = by_lanes(&problem, &model, &start, &views, &untouched, unit);
+            if let (Ok(found), Ok(expected)) = (&found, &at_start) {
+                close(found, expected, &AT_ONE_POINT)?;
+            }
             let found = by_lanes(&problem, &model, &start, &views, &options, unit);
             match (&found, &expected) {
                 (Ok(found), Ok(expected)) if expected.ending.is_converged() => {
                     prop_assert!(found.ending.is_converged(), "{:?} {}", found.ending, unit.name());
-                    close(found, expected)?;
+                    close(found, expected, &AT_THE_OPTIMUM)?;
                 }
                 (Ok(found), Ok(expected)) => prop_assert_eq!(found.ending, expected.ending),
                 _ => prop_assert_eq!(found.err(), expected.as_ref().err().copied()),
