@@ -345,6 +345,15 @@ class JointErrors:
         offset_rad: float | None = None,
     ) -> None: ...
 
+class LinkErrors:
+    """How joints displaced on their links move the motions: truly `exp(jacobians[k] l) @ motions[k]`.
+
+    `jacobians` (K, 6, m), one per view of the problem; `lengths` (m,): whether each column is a displacement
+    in metres, otherwise a tilt in radians.
+    """
+
+    def __init__(self, jacobians: ArrayLike, lengths: list[bool]) -> None: ...
+
 class Compressed:
     """Views of a problem, each reduced to the pose of its own image with that pose's information."""
 
@@ -374,6 +383,7 @@ class Compressed:
         sides: list[str] | None = None,
         levels: tuple[float, float] | None = None,
         joints: JointErrors | None = None,
+        links: LinkErrors | None = None,
         likeness: ArrayLike | None = None,
         prior_degrees: float = 20.0,
         floor_px2: float = 1e-8,
@@ -382,9 +392,9 @@ class Compressed:
         """The answer from these views, averaged over a grid of robot noise levels and sides.
 
         `levels` (metres, radians) gives them instead; then `sides` are all that is compared. With `joints`
-        noise of the joints is a further hypothesis, and their offsets are further parameters. With `likeness`
-        (K, K), the correlation of smooth errors between the views, errors that change smoothly with the
-        posture are further hypotheses.
+        noise of the joints is a further hypothesis, and their offsets are further parameters. With `links`
+        joints displaced on their links are further hypotheses. With `likeness` (K, K), the correlation of
+        smooth errors between the views, so are errors that change smoothly with the posture.
         """
 
 class Posterior:
@@ -396,6 +406,8 @@ class Posterior:
     def y(self) -> NDArray[float64]: ...
     @property
     def smooth_probability(self) -> float: ...
+    @property
+    def link_twists(self) -> list[float]: ...
     @property
     def camera_delta(self) -> list[float]: ...
     @property

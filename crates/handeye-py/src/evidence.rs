@@ -2,8 +2,8 @@
 
 use handeye_core::evidence::{
     CompressedView, EXACT_OFFSET_RAD, EvidenceOptions, Hypothesis, JointErrors as CoreJointErrors,
-    JointPrior, LevelPrior, Posterior as CorePosterior, SMOOTH_ODDS, SmoothError, WeakPrior, compress,
-    estimate, shrunk_variances, start_from_poses,
+    JointPrior, LevelPrior, LinkErrors as CoreLinkErrors, Nature, Posterior as CorePosterior, SMOOTH_ODDS,
+    SmoothError, WeakPrior, compress, estimate, shrunk_variances, start_from_poses,
 };
 use handeye_core::least_squares::{PixelParameters, Side};
 use handeye_core::se3::Se3;
@@ -21,6 +21,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(start_from_poses_py, module)?)?;
     module.add_class::<Compressed>()?;
     module.add_class::<JointErrors>()?;
+    module.add_class::<LinkErrors>()?;
     module.add_class::<Posterior>()
 }
 
@@ -98,12 +99,13 @@ impl JointErrors {
         prior: &LevelPrior,
         sides: &[Side],
         given: Option<Vec<Hypothesis>>,
+        links: Option<&LevelPrior>,
     ) -> Vec<Hypothesis> {
         let joint_prior = JointPrior::default();
         let noise = match (given, self.noise_rad) {
             (Some(given), _) => given,
             (None, Some(level)) => vec![Hypothesis::joints(level, 0.0)],
-            (None, None) => prior.grid_with(sides, Some(&joint_prior.noise)),
+            (None, None) => prior.grid_with(sides, Some(&joint_prior.noise), links),
         };
         match self.offset_rad {
             Some(level) => {
@@ -117,10 +119,38 @@ impl JointErrors {
     /// Those of the views with these numbers.
     fn select(&self, views: Option<&[usize]>) -> CoreJointErrors {
         let mut selected = self.inner.clone();
-        if let Some(views) = views {
-            selected.jacobians = views.iter().filter_map(|k| self.inner.jacobians.get(*k).cloned()).collect();
-        }
+        selected.jacobians = selected_of(&self.inner.jacobians, views);
         selected
+    }
+}
+
+/// How joints displaced on their links move the motions.
+#[pyclass(frozen, module = "handeye._core")]
+pub struct LinkErrors {
+    inner: CoreLinkErrors,
+}
+
+#[pymethods]
+impl LinkErrors {
+    #[new]
+    fn new<'py>(py: Python<'py>, jacobians: Array<'py>, lengths: Vec<bool>) -> PyResult<Self> {
+        Ok(Self { inner: CoreLinkErrors { jacobians: jacobian_list(py, &jacobians)?, lengths } })
+    }
+}
+
+impl LinkErrors {
+    /// Those of the views with these numbers.
+    fn select(&self, views: Option<&[usize]>) -> CoreLinkErrors {
+        let mut selected = self.inner.clone();
+        selected.jacobians = selected_of(&self.inner.jacobians, views);
+        selected
+    }
+}
+
+fn selected_of(jacobians: &[DMatrix<f64>], views: Option<&[usize]>) -> Vec<DMatrix<f64>> {
+    match views {
+        Some(views) => views.iter().filter_map(|k| jacobians.get(*k).cloned()).collect(),
+        None => jacobians.to_vec(),
     }
 }
 
@@ -214,8 +244,8 @@ impl Compressed {
     /// The answer from these views, averaged over the hypotheses; see the type stub.
     #[pyo3(signature = (
         *, views=None, camera_prior=None, start=None, prior_sigma_m=1.0, exact_probability=1.0/3.0,
-        sides=None, levels=None, joints=None, likeness=None, prior_degrees=20.0, floor_px2=1e-8,
-        linearisations=5,
+        sides=None, levels=None, joints=None, links=None, likeness=None, prior_degrees=20.0,
+        floor_px2=1e-8, linearisations=5,
     ))]
     #[expect(clippy::too_many_arguments, reason = "one keyword per assumption")]
     fn estimate<'py>(
@@ -229,12 +259,14 @@ impl Compressed {
         sides: Option<Vec<String>>,
         levels: Option<(f64, f64)>,
         joints: Option<&JointErrors>,
+        links: Option<&LinkErrors>,
         likeness: Option<Array<'py>>,
         prior_degrees: f64,
         floor_px2: f64,
         linearisations: usize,
     ) -> PyResult<Posterior> {
         let joint_errors = joints.map(|j| j.select(views.as_deref()));
+        let link_errors = links.map(|l| l.select(views.as_deref()));
         let chosen = self.select(py, views)?;
         let camera_prior = match camera_prior {
             Some(prior) => square(py, "camera_prior", &prior)?,
@@ -264,9 +296,10 @@ impl Compressed {
         };
         let smooth_odds = if smooth.is_some() { SMOOTH_ODDS } else { 0.0 };
         let prior = LevelPrior { exact_probability, smooth_odds, ..LevelPrior::default() };
+        let link_prior = links.map(|_| LevelPrior::of_links());
         let hypotheses = match joints {
-            Some(joints) => joints.hypotheses(&prior, &sides, given_levels),
-            None => given_levels.unwrap_or_else(|| prior.grid_of(&sides)),
+            Some(joints) => joints.hypotheses(&prior, &sides, given_levels, link_prior.as_ref()),
+            None => given_levels.unwrap_or_else(|| prior.grid_with(&sides, None, link_prior.as_ref())),
         };
         let start = given(py, start)?;
         let options = EvidenceOptions {
@@ -274,6 +307,7 @@ impl Compressed {
             camera_prior,
             joints: joint_errors,
             smooth,
+            links: link_errors,
             linearisations,
         };
         let (posterior, variances, origin) = py
@@ -330,10 +364,17 @@ impl Posterior {
         convert::matrix_out(py, &self.inner.y.to_matrix())
     }
 
-    /// Probability that the robot's error changes smoothly with the posture.
+    /// Probability that the robot's error changes smoothly with the posture: displaced joints do that too.
     #[getter]
     fn smooth_probability(&self) -> f64 {
-        self.hypotheses.iter().zip(&self.inner.weights).filter(|(h, _)| h.smooth).map(|(_, w)| w).sum()
+        let smooth = |h: &Hypothesis| h.nature != Nature::White;
+        self.hypotheses.iter().zip(&self.inner.weights).filter(|(h, _)| smooth(h)).map(|(_, w)| w).sum()
+    }
+
+    /// By how much the joints are displaced on their links, metres and radians.
+    #[getter]
+    fn link_twists(&self) -> Vec<f64> {
+        self.inner.link_twists.as_slice().to_vec()
     }
 
     /// Free camera parameters relative to their calibrated values.
@@ -388,7 +429,7 @@ impl Posterior {
     }
 
     /// Hypotheses as `(side, translation_m, rotation_rad, probability)`, likeliest first; side "left", "right",
-    /// "joints", "none".
+    /// "joints", "links", "none".
     #[getter]
     fn hypotheses(&self) -> Vec<(&'static str, f64, f64, f64)> {
         self.by_weight()
@@ -396,6 +437,7 @@ impl Posterior {
             .map(|i| {
                 let h = &self.hypotheses[i];
                 let side = match h.side {
+                    None if h.nature == Nature::Links => "links",
                     None if h.joint_rad > 0.0 => "joints",
                     None => "none",
                     Some(Side::Left) => "left",

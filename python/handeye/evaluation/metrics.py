@@ -1,7 +1,8 @@
 """How good a calibration is: the metrics of Yang, Rebello and Waslander (2023), and those that mislead less.
 
 Frames are those of the chain ``C_k = X A_k Y``: with the camera in the hand X is `T_ce` and Y is `T_bw` of
-the paper. `C_k` is the pose of the target found in the image of view k alone.
+the paper. `C_k` is the pose of the target found in the image of view k alone. Where the
+arm is known, A_k is that of the arm as the estimate has found its joints and links to be.
 """
 
 from dataclasses import dataclass
@@ -52,7 +53,7 @@ def held_out_rmse_px(estimate: Estimate, held_out: Measurements) -> float:
     """
     if len(held_out) < 2:
         raise InputError(f"{len(held_out)} held-out views, at least 2 are needed", code="too_few_views")
-    problem = held_out.with_camera(estimate.camera).problem
+    problem = estimate.corrected(held_out).with_camera(estimate.camera).problem
     squared = [
         problem.squared_error(estimate.X.matrix, estimate.Y.matrix, views=[k]) / count
         for k, count in enumerate(held_out.point_counts)
@@ -73,7 +74,8 @@ def relative_error(estimate: Estimate, held_out: Measurements) -> Deviation:
         No view.
     """
     poses = inverses(_some(held_out).camera_poses)
-    return _mean_deviation(estimate.Y.matrix @ poses @ estimate.X.matrix @ held_out.motions)
+    motions = estimate.corrected(held_out).motions
+    return _mean_deviation(estimate.Y.matrix @ poses @ estimate.X.matrix @ motions)
 
 
 def relative_error_at_target(estimate: Estimate, held_out: Measurements) -> Deviation:
@@ -85,7 +87,8 @@ def relative_error_at_target(estimate: Estimate, held_out: Measurements) -> Devi
         No view.
     """
     poses = inverses(_some(held_out).camera_poses)
-    return _mean_deviation(poses @ estimate.X.matrix @ held_out.motions @ estimate.Y.matrix)
+    motions = estimate.corrected(held_out).motions
+    return _mean_deviation(poses @ estimate.X.matrix @ motions @ estimate.Y.matrix)
 
 
 def inverses(poses: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ what an ordinary calibration leaves.
 """
 
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 
@@ -16,6 +16,7 @@ from handeye import _core
 from handeye.errors import SolveError
 from handeye.evaluation.metrics import inverses
 from handeye.robots import Arm, open_arm
+from handeye.robots.displaced import displaced, random_displacements
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Target, Truth, View
 from handeye.types.arrays import FloatArray
 
@@ -298,10 +299,6 @@ def _reported(
     if kind is ErrorKind.SMOOTH_KINEMATIC:
         metres = _level(random, options.length_sigma_m)
         degrees = _level(random, options.twist_sigma_deg)
-        # Where base and flange are is a matter of names: the first joint and the last link stay as they are.
-        wrong = [arm.joints[0]] + [
-            replace(joint, placement=joint.placement @ Pose.exp(_twist(random, metres, degrees)))
-            for joint in arm.joints[1:]
-        ]
-        return replace(arm, joints=tuple(wrong)).forward(joints), joints
+        built = random_displacements(random, arm, metres, float(np.deg2rad(degrees)))
+        return displaced(arm, built).forward(joints), joints
     return true, joints

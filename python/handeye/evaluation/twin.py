@@ -7,7 +7,7 @@ Each set has a part to choose views from and a part to validate on, drawn alike.
 """
 
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from handeye.evaluation.metrics import inverses
 from handeye.evaluation.simulate import camera_information, symmetric
 from handeye.planning.collisions import Body, Workspace
 from handeye.robots import Arm, open_arm
+from handeye.robots.displaced import displaced, random_displacements
 from handeye.types import Camera, CircleGrid, Mounting, Pose, Recording, Truth, View
 from handeye.types.arrays import FloatArray, IndexArray
 
@@ -229,24 +230,13 @@ def _wrong_arm(
     random: np.random.Generator, arm: Arm, joints: FloatArray, options: TwinOptions
 ) -> tuple[Arm, tuple[float, float]]:
     """Return the arm as it was built, and by how much it is off (metres, radians)."""
-    metres = random.standard_normal((len(arm), 6)) * np.repeat([1.0, options.twist_per_length_rad_m], 3)
-    # Where the base is is a matter of names.
-    metres[0] = 0.0
+    metres = random_displacements(random, arm, 1.0, options.twist_per_length_rad_m)
     scale = 1e-4
-    wrong = _built(arm, scale * metres)
+    wrong = displaced(arm, scale * metres)
     for _ in range(3):  # the error is very nearly proportional
         scale *= options.arm_error_m / arm_error(arm.forward(joints), wrong.forward(joints))[0]
-        wrong = _built(arm, scale * metres)
+        wrong = displaced(arm, scale * metres)
     return wrong, arm_error(arm.forward(joints), wrong.forward(joints))
-
-
-def _built(arm: Arm, twists: FloatArray) -> Arm:
-    """Return the arm with each joint displaced by a twist (n, 6) on the link before it."""
-    placed = tuple(
-        replace(joint, placement=joint.placement @ Pose.exp(twist), lower=-np.inf, upper=np.inf)
-        for joint, twist in zip(arm.joints, twists, strict=True)
-    )
-    return replace(arm, joints=placed)
 
 
 def arm_error(reported: FloatArray, true: FloatArray) -> tuple[float, float]:

@@ -265,7 +265,7 @@ def _check(
         progress=part_of(progress, len(halvings) + 1, total),
     )
     found = tuple(agreement for agreement in agreements[1:] if agreement is not None)
-    problem = measurements.with_camera(estimate.camera).problem
+    problem = estimate.corrected(measurements).with_camera(estimate.camera).problem
     squared = problem.squared_error(estimate.X.matrix, estimate.Y.matrix)
     return ModelCheck(
         model=model,

@@ -70,6 +70,41 @@ class ArmKinematics:
             return -(self.T_tip_flange.inverse().adjoint() @ self.arm.jacobian(joints, "flange"))
         return self.T_base_root.adjoint() @ self.arm.jacobian(joints, "base")
 
+    @property
+    def link_twists(self) -> FloatArray:
+        """(n, 6, m) twist of each joint on the link before it, per way of displacing it.
+
+        Where the first joint sits says where the base is, and the place and angle of the last along its own
+        axis where the flange is: matters of names, and left out.
+        """
+        count = len(self.arm)
+        ways: list[FloatArray] = []
+        for i in range(1, count):
+            axis = np.array(self.arm.joints[i].axis)
+            along, *across = np.linalg.svd(axis[np.newaxis])[2]
+            for first in (0, 3):
+                for direction in across if i == count - 1 else (*across, along):
+                    way = np.zeros((count, 6))
+                    way[i, first : first + 3] = direction
+                    ways.append(way)
+        return np.moveaxis(np.array(ways).reshape(-1, count, 6), 0, 2)
+
+    def link_jacobians(self, mounting: Mounting, joints: FloatArray) -> FloatArray:
+        """(K, 6, m) L at joint positions (K, n): truly ``A = exp(L l) A_reported``, l metres and radians."""
+        before = np.broadcast_to(self.T_base_root.matrix, (len(joints), 4, 4))
+        ways = self.link_twists
+        total = np.zeros((len(joints), 6, ways.shape[2]))
+        for i, joint in enumerate(self.arm.joints):
+            placed = np.ascontiguousarray(before @ joint.placement.matrix)
+            total += _core.se3_adjoint(placed) @ ways[i]
+            screw = np.zeros(6)
+            axis = np.array(joint.axis)
+            screw[(0 if joint.sliding else 3) :][:3] = axis / np.linalg.norm(axis)
+            before = placed @ _core.se3_exp(np.outer(joints[:, i], screw))
+        if mounting is Mounting.EYE_TO_HAND:
+            return total
+        return -_core.se3_adjoint(np.linalg.inv(self.forward(joints))) @ total
+
 
 def arm_kinematics(arm: Arm, views: Sequence[View]) -> ArmKinematics:
     """Return the kinematics of an arm in the frames that the poses of these views are reported in.

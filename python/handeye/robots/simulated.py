@@ -2,12 +2,13 @@
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from handeye import _core
 from handeye.errors import DeviceError, InputError, SolveError
+from handeye.robots.displaced import displaced, random_displacements
 from handeye.robots.model import Arm
 from handeye.robots.protocol import Goal, Reading
 from handeye.types import Pose
@@ -84,7 +85,8 @@ class SimulatedArm:
         random = np.random.default_rng([seed, 1])
         self._offsets = errors.offset_sigma_rad * random.standard_normal(len(arm))
         self._offsets[[0, -1]] = 0.0
-        self._true = _built_wrong(arm, errors, random)
+        built = random_displacements(random, arm, errors.length_sigma_m, errors.twist_sigma_rad)
+        self._true = displaced(arm, built)
         self._commanded = np.array(start_rad, dtype=np.float64)
         self._T_base_flange = self._stand(self._commanded, self._commanded, "start")
 
@@ -139,15 +141,3 @@ class SimulatedArm:
         )
         base, flange = _core.se3_exp((sigma * random.standard_normal(12)).reshape(2, 6))
         return Pose(base @ pose @ flange)
-
-
-def _built_wrong(arm: Arm, errors: ArmErrors, random: np.random.Generator) -> Arm:
-    """Return the arm as it was built; where base and flange are is a matter of names and stays."""
-    sigma = np.repeat([errors.length_sigma_m, errors.twist_sigma_rad], 3)
-    twists = sigma * random.standard_normal((len(arm), 6))
-    twists[0] = 0.0
-    joints = tuple(
-        replace(joint, placement=joint.placement @ Pose.exp(twist), lower=-np.inf, upper=np.inf)
-        for joint, twist in zip(arm.joints, twists, strict=True)
-    )
-    return replace(arm, joints=joints)

@@ -3,7 +3,8 @@
 Robot noise is marginalised on the flange side, on the base side or not at all; its levels and its side are
 weighed by their restricted likelihood and the answer is averaged over them. Camera parameters have the
 covariance of their calibration, inflated, as a prior. Every view has its own pixel noise. Where the arm's
-kinematics are known, noise of its joints is a further hypothesis and offsets of its joints are parameters.
+kinematics are known, noise of its joints and joints displaced on their links are further hypotheses, and
+offsets of its joints are parameters.
 """
 
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ from handeye import _core
 from handeye.solving.estimate import Estimate, Hypothesis, side_of_robot
 from handeye.solving.initialize import check_views
 from handeye.solving.joints import JointModel
+from handeye.solving.links import LinkModel
 from handeye.solving.measurements import Measurements, ViewPose
 from handeye.solving.observability import undetermined
 from handeye.types.arrays import FloatArray
@@ -103,6 +105,8 @@ class AutoOptions:
         Whether the robot's error may be one that changes smoothly with the posture.
     kinematics
         The arm, if it is known; every view must then have joint positions.
+    links
+        Whether the joints of a known arm may be displaced on their links. Not where any level is given.
     joint_noise_rad
         Standard deviation of the noise of the joints if known; the robot then errs in nothing else. None to
         find it, and to weigh it against noise of flange and base.
@@ -117,8 +121,15 @@ class AutoOptions:
     free_camera: bool = True
     smooth: bool = True
     kinematics: Kinematics | None = None
+    links: bool = True
     joint_noise_rad: float | None = None
     joint_offset_rad: float | None = None
+
+    @property
+    def weighs_links(self) -> bool:
+        """Whether joints displaced on their links are among the hypotheses."""
+        known = (self.levels, self.joint_noise_rad, self.joint_offset_rad)
+        return self.links and self.kinematics is not None and known == (None, None, None)
 
 
 @dataclass(frozen=True)
@@ -158,6 +169,9 @@ class AutoEstimator:
             name for name, side in zip(("left", "right"), left_first, strict=True) if side in options.sides
         ]
         arm = None if options.kinematics is None else JointModel.of(options.kinematics, measurements)
+        links = None
+        if options.kinematics is not None and options.weighs_links:
+            links = LinkModel.of(options.kinematics, measurements)
         posterior = compressed.estimate(
             camera_prior=prior.information if prior.free else None,
             start=None if previous is None else (previous.X.matrix, previous.Y.matrix),
@@ -165,6 +179,7 @@ class AutoEstimator:
             sides=sides,
             levels=options.levels,
             joints=None if arm is None else arm.errors(options.joint_noise_rad, options.joint_offset_rad),
+            links=None if links is None else links.errors(),
             likeness=None if options.levels or not options.smooth else posture_likeness(measurements),
             floor_px2=LEAST_PIXEL_SIGMA**2,
         )
@@ -172,12 +187,13 @@ class AutoEstimator:
         parameters[list(prior.free)] += posterior.camera_delta
         camera = Camera(measurements.camera.lens, parameters, *measurements.camera.size_px)
         hypotheses = tuple(
-            _hypothesis(posterior, i, mounting, arm)
+            _hypothesis(posterior, i, mounting, arm, links)
             for i, (_, _, _, probability) in enumerate(posterior.hypotheses)
             if probability > 1e-4
         )
         sigma_px = np.sqrt(posterior.variances_px2)
         X, Y = Pose(posterior.x), Pose(posterior.y)
+        displaced = np.array(posterior.link_twists)
         noise = replace(_noise(sigma_px, hypotheses, arm), smooth_probability=posterior.smooth_probability)
         return Estimate(
             mounting=mounting,
@@ -199,11 +215,13 @@ class AutoEstimator:
             kinematics=options.kinematics,
             free_joints=() if arm is None else arm.free,
             joint_offsets=() if arm is None else arm.offsets(posterior.joint_offsets, posterior.covariance),
+            link_errors=() if links is None else links.named(displaced),
+            arm_correction=None if arm is None else (arm.all_offsets(posterior.joint_offsets), displaced),
         )
 
 
 def _hypothesis(
-    posterior: _core.Posterior, rank: int, mounting: Mounting, arm: JointModel | None
+    posterior: _core.Posterior, rank: int, mounting: Mounting, arm: JointModel | None, links: LinkModel | None
 ) -> Hypothesis:
     side, translation, rotation, probability = posterior.hypotheses[rank]
     joint_rad, _ = posterior.joint_levels[rank]
@@ -211,6 +229,8 @@ def _hypothesis(
     if arm is not None and joint_rad > 0:
         translation, rotation = arm.lever_m * joint_rad, arm.turn * joint_rad
         deviations = arm.deviations(joint_rad)
+    if links is not None and side == RobotSide.LINKS:
+        translation, rotation = links.at_flange(translation, rotation)
     information = posterior.information(rank)
     return Hypothesis(
         probability, side_of_robot(mounting, side), translation, rotation, information, deviations
@@ -219,7 +239,8 @@ def _hypothesis(
 
 def _noise(sigma_px: FloatArray, hypotheses: tuple[Hypothesis, ...], arm: JointModel | None) -> Noise:
     """Sum the hypotheses up: the likeliest side, and its levels as geometric means."""
-    evidence = {side.value: 0.0 for side in RobotSide if side is not RobotSide.JOINTS or arm is not None}
+    of_arms = (RobotSide.JOINTS, RobotSide.LINKS)
+    evidence = {side.value: 0.0 for side in RobotSide if side not in of_arms or arm is not None}
     for hypothesis in hypotheses:
         evidence[hypothesis.robot_side.value] += hypothesis.probability
     side = RobotSide(max(evidence, key=lambda name: evidence[name]))

@@ -137,16 +137,17 @@ def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibratio
         unobservable=estimate.unobservable,
         degrees_of_freedom=estimate.degrees_of_freedom,
         joint_offsets=estimate.joint_offsets,
+        link_errors=estimate.link_errors,
     )
 
 
 def view_rmse_px(measurements: Measurements, estimate: Estimate) -> FloatArray:
-    """(K,) root mean square over the points of each view of the residual's norm, robot poses as reported.
+    """(K,) root mean square over the points of each view of the residual's norm.
 
+    Robot poses are as reported, put right by what is known of the joints and links of a known arm.
     Infinite where the estimate puts the target out of sight.
     """
-    with_camera = measurements.with_camera(estimate.camera)
-    problem = with_camera.problem
+    problem = estimate.corrected(measurements).with_camera(estimate.camera).problem
     return np.array(
         [
             np.sqrt(problem.squared_error(estimate.X.matrix, estimate.Y.matrix, views=[k]) / count)

@@ -10,7 +10,7 @@ from handeye import _core
 from handeye.errors import DegenerateError
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import JointOffset, ModelName, Noise, RobotSide, Unobservable
+from handeye.types.calibration import JointOffset, LinkError, ModelName, Noise, RobotSide, Unobservable
 from handeye.types.camera import Camera
 from handeye.types.kinematics import Kinematics
 from handeye.types.mounting import Mounting
@@ -47,7 +47,8 @@ class Sight:
 def side_of_chain(mounting: Mounting, side: RobotSide) -> str | None:
     """Return which side of A in the chain a side of the robot is: "left", "right", or None for no noise.
 
-    Noise of the joints counts as noise of the flange, where it is not known how they move it.
+    Noise of the joints counts as noise of the flange, where it is not known how they move it, and so do
+    errors of the links, of which a further view brings some that are new.
     """
     if side is RobotSide.NONE:
         return None
@@ -56,8 +57,8 @@ def side_of_chain(mounting: Mounting, side: RobotSide) -> str | None:
 
 
 def side_of_robot(mounting: Mounting, side: str) -> RobotSide:
-    """Return which side of the robot a side of A in the chain is; "none" and "joints" are what they are."""
-    if side in {"none", "joints"}:
+    """Return which side of the robot a side of A is; all but left and right are what they are called."""
+    if side in {"none", "joints", "links"}:
         return RobotSide(side)
     flange_is_left = mounting is Mounting.EYE_IN_HAND
     return RobotSide.FLANGE if (side == "left") == flange_is_left else RobotSide.BASE
@@ -75,7 +76,7 @@ class Hypothesis:
     Parameters
     ----------
     robot_translation_m, robot_rotation_rad
-        Standard deviations per axis; of the flange on average, if the noise is in the joints.
+        Standard deviations per axis; of the flange on average, if the noise is in the joints or links.
     joint_deviations
         Standard deviation of each joint (radians, metres), if the noise is in the joints.
     """
@@ -106,6 +107,11 @@ class Estimate:
         Pixel noise expected of a further view.
     kinematics, free_joints, joint_offsets
         The arm, if it is known, which of its joints have an offset that is a parameter, and what it is.
+    link_errors
+        How the joints of a known arm most likely sit on their links; empty without one.
+    arm_correction
+        The same for `Kinematics.motion_jacobians` and `link_jacobians`: offsets (n,) of all joints, and
+        displacements (m,) of all links.
     unobservable
         Directions of X and Y that the views leave open; a weak prior stands in for them.
     """
@@ -129,6 +135,8 @@ class Estimate:
     kinematics: Kinematics | None = None
     free_joints: tuple[int, ...] = ()
     joint_offsets: tuple[JointOffset, ...] = ()
+    link_errors: tuple[LinkError, ...] = ()
+    arm_correction: tuple[FloatArray, FloatArray] | None = None
 
     @property
     def determined(self) -> bool:
@@ -188,6 +196,24 @@ class Estimate:
             margin_px=sight.margin_px,
             fewest=1 if sight.known else sight.fewest or self.target.point_count,
         )
+
+    def corrected(self, measurements: Measurements) -> Measurements:
+        """Return measurements with robot poses as the arm stands by what is known of it.
+
+        As they are where the arm is not known, or a view has no joint positions.
+        """
+        if self.kinematics is None or self.arm_correction is None:
+            return measurements
+        if any(view.joints_rad is None for view in measurements.views):
+            return measurements
+        offsets, links = self.arm_correction
+        twists = self.kinematics.motion_jacobians(self.mounting, measurements.joints) @ offsets
+        twists += self.kinematics.link_jacobians(self.mounting, measurements.joints) @ links
+        motions = _core.se3_exp(twists) @ measurements.motions
+        # What leads from a robot pose to A leads back.
+        poses = [self.mounting.chain(Pose(motion)) for motion in motions]
+        views = zip(measurements.views, poses, strict=True)
+        return replace(measurements, views=tuple(replace(view, T_base_flange=pose) for view, pose in views))
 
     def jacobians(self, joints: FloatArray | None) -> FloatArray | None:
         """(N, 6, n) how joints at positions (N, n) move A; None where arm or positions are not known."""

@@ -91,6 +91,12 @@ class JointModel:
         """Standard deviation of each joint at a level of the noise, radians or metres; empty for none."""
         return tuple((self.scales * joint_rad).tolist()) if joint_rad > 0 else ()
 
+    def all_offsets(self, values: list[float]) -> FloatArray:
+        """(n,) offsets of all joints, zero where they are no parameters."""
+        offsets = np.zeros(len(self.scales))
+        offsets[list(self.free)] = values
+        return offsets
+
     def offsets(self, values: list[float], covariance: FloatArray) -> tuple[JointOffset, ...]:
         """Name the offsets; their covariance is the last block of that of all parameters."""
         sigmas = np.sqrt(np.diag(covariance))[len(covariance) - len(self.free) :]

@@ -33,6 +33,8 @@ class RobotSide(StrEnum):
     BASE = "base"
     JOINTS = "joints"
     """In the positions of the joints; compared only where the arm's kinematics are known."""
+    LINKS = "links"
+    """In where the joints sit on the links; compared only where the arm's kinematics are known."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,8 @@ class Noise:
     robot_side
         Where the robot's error acts; `none` if its poses are taken as exact.
     robot_translation_m, robot_rotation_rad
-        Standard deviation per axis of the robot's error; of the flange on average, if it acts in the joints.
+        Standard deviation per axis of the robot's error; of the flange on average, if it acts in the joints
+        or links.
     joint_rad
         Standard deviation of the position of each joint, if the error acts there.
     how
@@ -102,6 +105,30 @@ class JointOffset:
             "joint": self.joint,
             f"offset_{unit}": self.offset * factor,
             f"sigma_{unit}": self.sigma * factor,
+        }
+
+
+@dataclass(frozen=True)
+class LinkError:
+    """How a joint truly sits on the link before it, relative to where the description has it.
+
+    Parameters
+    ----------
+    joint
+        Its name.
+    twist
+        Displacement (metres) and tilt (radians) in the frame of the joint.
+    """
+
+    joint: str
+    twist: tuple[float, float, float, float, float, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON, with units in the keys."""
+        return {
+            "joint": self.joint,
+            "translation_mm": [MM_PER_M * value for value in self.twist[:3]],
+            "rotation_deg": np.rad2deg(self.twist[3:]).tolist(),
         }
 
 
@@ -165,6 +192,9 @@ class Calibration:
         Root mean square over all points of all used views of the residual's norm.
     joint_offsets
         What was found of the offsets of the joints, where the arm's kinematics were given.
+    link_errors
+        How the joints most likely sit on their links, where the arm's kinematics were given and the views
+        say so. The hand-eye is then that of the arm as it is, not of the poses as reported.
     degrees_of_freedom
         Degrees of freedom of the noise levels behind the covariance; infinite if they were given. Regions
         take quantiles of F(6, degrees of freedom) in place of chi-square.
@@ -188,6 +218,7 @@ class Calibration:
     unobservable: tuple[Unobservable, ...] = ()
     degrees_of_freedom: float = float("inf")
     joint_offsets: tuple[JointOffset, ...] = ()
+    link_errors: tuple[LinkError, ...] = ()
 
     @property
     def results(self) -> dict[str, Pose]:
@@ -213,8 +244,10 @@ class Calibration:
         """Return plain values for JSON: stable keys, transforms row-major in metres, units in the keys."""
         deviations = np.sqrt(np.diag(self.covariance))
         offsets = [offset.to_dict() for offset in self.joint_offsets]
+        links = [error.to_dict() for error in self.link_errors]
         return {
             **({"joint_offsets": offsets} if offsets else {}),
+            **({"link_errors": links} if links else {}),
             "mounting": self.mounting.value,
             **{name: pose.to_list() for name, pose in self.results.items()},
             "rmse_px": self.rmse_px,

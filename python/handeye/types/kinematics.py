@@ -29,3 +29,16 @@ class Kinematics(Protocol):
         robot reports at q. On the left is the flange for eye in hand, the base for eye to hand.
         """
         ...
+
+    @property
+    def link_twists(self) -> FloatArray:
+        """(n, 6, m) twist by which each joint is displaced on the link before it, per way l of displacing.
+
+        In the frame of the joint, before it moves. Each way is a displacement in metres or a tilt in radians.
+        Ways that only say where base and flange are, are none.
+        """
+        ...
+
+    def link_jacobians(self, mounting: Mounting, joints: FloatArray) -> FloatArray:
+        """(K, 6, m) L of the chain at joint positions (K, n): truly ``A = exp(L l) A_reported``."""
+        ...

@@ -2,6 +2,17 @@
 
 use crate::least_squares::Side;
 
+/// How errors of different views hang together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Nature {
+    /// Another error in each view.
+    White,
+    /// An error that changes smoothly with the posture. Needs [`super::SmoothError`].
+    Smooth,
+    /// Joints displaced on their links, by these levels each. Needs [`super::LinkErrors`].
+    Links,
+}
+
 /// One point of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hypothesis {
@@ -11,8 +22,8 @@ pub struct Hypothesis {
     pub translation_m: f64,
     /// Standard deviation per axis, radians.
     pub rotation_rad: f64,
-    /// Whether the error changes smoothly with the posture, or is another in each view. Needs [`super::SmoothError`].
-    pub smooth: bool,
+    /// How the errors of different views hang together.
+    pub nature: Nature,
     /// Standard deviation of the noise of the joints, radians; zero for none. Needs [`super::JointErrors`].
     pub joint_rad: f64,
     /// Standard deviation of the offsets of the joints, radians; meaningless without [`super::JointErrors`].
@@ -28,7 +39,7 @@ impl Hypothesis {
             side: None,
             translation_m: 0.0,
             rotation_rad: 0.0,
-            smooth: false,
+            nature: Nature::White,
             joint_rad: 0.0,
             offset_rad: EXACT_OFFSET_RAD,
             log_prior,
@@ -45,10 +56,15 @@ impl Hypothesis {
         Self { joint_rad, ..Self::exact(log_prior) }
     }
 
+    /// Joints displaced on their links by these standard deviations per axis.
+    pub fn links(translation_m: f64, rotation_rad: f64, log_prior: f64) -> Self {
+        Self { translation_m, rotation_rad, nature: Nature::Links, ..Self::exact(log_prior) }
+    }
+
     /// Whether the noise is the same, whatever the offsets.
     pub(super) fn same_noise(&self, other: &Self) -> bool {
-        (self.side, self.translation_m, self.rotation_rad, self.smooth, self.joint_rad)
-            == (other.side, other.translation_m, other.rotation_rad, other.smooth, other.joint_rad)
+        (self.side, self.translation_m, self.rotation_rad, self.nature, self.joint_rad)
+            == (other.side, other.translation_m, other.rotation_rad, other.nature, other.joint_rad)
     }
 }
 
@@ -100,6 +116,8 @@ impl Default for JointPrior {
 
 impl JointPrior {
     /// Every hypothesis about the noise with every level of the offsets; one noise after another.
+    ///
+    /// Displaced joints may be turned about their axes too, which is an offset: they stand for themselves.
     pub fn with_offsets(&self, noise: &[Hypothesis]) -> Vec<Hypothesis> {
         let mut offsets = vec![(EXACT_OFFSET_RAD, self.no_offset_probability.ln())];
         let share = (1.0 - self.no_offset_probability).ln();
@@ -108,9 +126,14 @@ impl JointPrior {
         noise
             .iter()
             .flat_map(|h| {
-                offsets.iter().map(|(offset_rad, log)| Hypothesis {
+                let (levels, share) = if h.nature == Nature::Links {
+                    (&offsets[..1], -offsets[0].1)
+                } else {
+                    (&offsets[..], 0.0)
+                };
+                levels.iter().map(move |(offset_rad, log)| Hypothesis {
                     offset_rad: *offset_rad,
-                    log_prior: h.log_prior + log,
+                    log_prior: h.log_prior + log + share,
                     ..*h
                 })
             })
@@ -167,6 +190,21 @@ impl Default for LevelPrior {
     }
 }
 
+impl LevelPrior {
+    /// Of the joints of an arm, displaced on their links: a lever is metres of displacement per radian of tilt.
+    pub fn of_links() -> Self {
+        Self {
+            rotation_median_rad: 0.03_f64.to_radians(),
+            rotation_spread: 1.5,
+            lever_median_m: 0.5,
+            lever_spread: 1.0,
+            rotation_grid: (3e-3_f64.to_radians(), 0.4_f64.to_radians(), 8),
+            lever_grid: (0.15, 2.0, 3),
+            ..Self::default()
+        }
+    }
+}
+
 /// `n` values from `low` to `high` with equal ratios.
 fn geometric(low: f64, high: f64, n: usize) -> Vec<f64> {
     let step = if n > 1 { (high / low).ln() / (n - 1) as f64 } else { 0.0 };
@@ -198,18 +236,24 @@ impl LevelPrior {
 
     /// The grid over the given sides, equally likely; probabilities sum to one.
     pub fn grid_of(&self, sides: &[Side]) -> Vec<Hypothesis> {
-        self.grid_with(sides, None)
+        self.grid_with(sides, None, None)
     }
 
-    /// As [`LevelPrior::grid_of`]; noise of the joints, where known how it acts, is as likely as either side.
-    pub fn grid_with(&self, sides: &[Side], joints: Option<&LogNormal>) -> Vec<Hypothesis> {
+    /// As [`LevelPrior::grid_of`]; noise of the joints and displaced joints, where known how they act, are each as
+    /// likely as either side.
+    pub fn grid_with(
+        &self,
+        sides: &[Side],
+        joints: Option<&LogNormal>,
+        links: Option<&LevelPrior>,
+    ) -> Vec<Hypothesis> {
         let white = self.levels(self.rotation_grid, self.lever_grid);
         let smooth = self.levels(self.smooth_rotation_grid, self.smooth_lever_grid);
         let mut grid = Vec::with_capacity(1 + (white.len() + smooth.len()) * sides.len());
         if self.exact_probability > 0.0 {
             grid.push(Hypothesis::exact(self.exact_probability.ln()));
         }
-        let kinds = sides.len() + usize::from(joints.is_some());
+        let kinds = sides.len() + usize::from(joints.is_some()) + usize::from(links.is_some());
         let each = ((1.0 - self.exact_probability) / kinds as f64).ln();
         let smooth_share = self.smooth_odds / (1.0 + self.smooth_odds);
         for side in sides {
@@ -220,7 +264,7 @@ impl LevelPrior {
         if self.smooth_odds > 0.0 {
             for side in sides {
                 grid.extend(smooth.iter().map(|(rotation, lever, log)| Hypothesis {
-                    smooth: true,
+                    nature: Nature::Smooth,
                     ..Hypothesis::twists(*side, rotation * lever, *rotation, log + each + smooth_share.ln())
                 }));
             }
@@ -228,6 +272,14 @@ impl LevelPrior {
         if let Some(joints) = joints {
             let values = joints.values();
             grid.extend(values.into_iter().map(|(rad, log)| Hypothesis::joints(rad, log + each)));
+        }
+        if let Some(links) = links {
+            let levels = links.levels(links.rotation_grid, links.lever_grid);
+            grid.extend(
+                levels
+                    .into_iter()
+                    .map(|(rotation, lever, log)| Hypothesis::links(rotation * lever, rotation, log + each)),
+            );
         }
         grid
     }
@@ -248,18 +300,21 @@ mod tests {
     #[test]
     fn probabilities_with_joints_sum_to_one() {
         let prior = JointPrior::default();
-        let noise = LevelPrior::default().grid_with(&[Side::Left, Side::Right], Some(&prior.noise));
+        let links = LevelPrior::of_links();
+        let sides = [Side::Left, Side::Right];
+        let noise = LevelPrior::default().grid_with(&sides, Some(&prior.noise), Some(&links));
         let by_kind = |wanted: fn(&Hypothesis) -> bool| -> f64 {
             noise.iter().filter(|h| wanted(h)).map(|h| h.log_prior.exp()).sum()
         };
-        assert!((by_kind(|h| h.joint_rad > 0.0) - 2.0 / 9.0).abs() < 1e-12);
-        assert!((by_kind(|h| h.side == Some(Side::Right)) - 2.0 / 9.0).abs() < 1e-12);
+        assert!((by_kind(|h| h.joint_rad > 0.0) - 1.0 / 6.0).abs() < 1e-12);
+        assert!((by_kind(|h| h.nature == Nature::Links) - 1.0 / 6.0).abs() < 1e-12);
+        assert!((by_kind(|h| h.side == Some(Side::Right)) - 1.0 / 6.0).abs() < 1e-12);
         let grid = prior.with_offsets(&noise);
-        assert_eq!(grid.len(), (1 + 2 * 72 + 13) * 8);
+        assert_eq!(grid.len(), (1 + 2 * 72 + 13) * 8 + 24);
         let total: f64 = grid.iter().map(|h| h.log_prior.exp()).sum();
         assert!((total - 1.0).abs() < 1e-12);
         let exact: f64 =
             grid.iter().filter(|h| h.offset_rad == EXACT_OFFSET_RAD).map(|h| h.log_prior.exp()).sum();
-        assert!((exact - 1.0 / 3.0).abs() < 1e-12);
+        assert!((exact - (1.0 / 6.0 + 5.0 / 6.0 / 3.0)).abs() < 1e-12);
     }
 }

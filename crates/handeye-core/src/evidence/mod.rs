@@ -9,13 +9,15 @@ mod chain;
 mod compressed;
 mod hypotheses;
 mod joints;
+mod links;
 mod posterior;
 mod smooth;
 
 pub use chain::{ChainStart, WeakPrior, start_from_poses};
 pub use compressed::{CompressedView, compress, shrunk_variances};
-pub use hypotheses::{EXACT_OFFSET_RAD, Hypothesis, JointPrior, LevelPrior, LogNormal, SMOOTH_ODDS};
+pub use hypotheses::{EXACT_OFFSET_RAD, Hypothesis, JointPrior, LevelPrior, LogNormal, Nature, SMOOTH_ODDS};
 pub use joints::JointErrors;
+pub use links::LinkErrors;
 pub use posterior::{EvidenceOptions, Posterior, estimate};
 pub use smooth::SmoothError;
 

@@ -5,12 +5,13 @@
 //! Integrating `theta` out (flat but for the priors) leaves the restricted likelihood of the levels,
 //! `-2 ln p = sum ln |Sigma_k| + e' Sigma^-1 e - theta' r + ln |Lambda|` (Patterson and Thompson 1971).
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Vector6};
 
 use super::chain::WeakPrior;
 use super::compressed::CompressedView;
-use super::hypotheses::Hypothesis;
+use super::hypotheses::{Hypothesis, Nature};
 use super::joints::JointErrors;
+use super::links::LinkErrors;
 use super::smooth::SmoothError;
 use crate::error::Error;
 use crate::least_squares::Side;
@@ -27,6 +28,8 @@ pub struct EvidenceOptions {
     pub joints: Option<JointErrors>,
     /// How alike smooth errors are between the views, where such are supposed.
     pub smooth: Option<SmoothError>,
+    /// How displaced joints move the motions, where the arm's kinematics are known and its links are in doubt.
+    pub links: Option<LinkErrors>,
     /// Most re-linearisations.
     pub linearisations: usize,
 }
@@ -42,6 +45,8 @@ pub struct Posterior {
     pub camera_delta: DVector<f64>,
     /// Offsets of the free joints, true minus read, radians or metres, averaged.
     pub joint_offsets: DVector<f64>,
+    /// By how much the joints are displaced on their links, metres and radians, averaged; empty without links.
+    pub link_twists: DVector<f64>,
     /// Probability of each hypothesis.
     pub weights: Vec<f64>,
     /// Information of `[xi_x, xi_y, c, joint offsets]` under each hypothesis.
@@ -64,6 +69,8 @@ const HOPELESS: f64 = 50.0;
 struct Linear {
     information: DMatrix<f64>,
     theta: DVector<f64>,
+    /// By how much the joints are most likely displaced, where that is the hypothesis.
+    link_twists: Option<DVector<f64>>,
     minus_two_log_likelihood: f64,
 }
 
@@ -82,6 +89,8 @@ struct View {
 struct Sums {
     products: DMatrix<f64>,
     log_determinant: f64,
+    /// What was integrated out: the factor of its information, and its products with the other columns.
+    shared: Option<(Cholesky<f64, Dyn>, DMatrix<f64>)>,
 }
 
 /// Estimates `X`, `Y` and the camera from compressed views with pixel variances, averaged over the hypotheses.
@@ -100,7 +109,7 @@ pub fn estimate(
     if views.len() != variances_px2.len() || views.is_empty() {
         return Err(Error::invalid("views and pixel variances must be as many, at least one"));
     }
-    if hypotheses.iter().all(|h| h.smooth) {
+    if hypotheses.iter().all(|h| h.nature == Nature::Smooth) {
         return Err(Error::invalid("at least one hypothesis must not be smooth"));
     }
     if views.iter().any(|v| v.sensitivity.ncols() != n_c) {
@@ -115,11 +124,19 @@ pub fn estimate(
     }
     match &options.smooth {
         Some(smooth) => smooth.check(views.len())?,
-        None if hypotheses.iter().any(|h| h.smooth) => {
+        None if hypotheses.iter().any(|h| h.nature == Nature::Smooth) => {
             return Err(Error::invalid("smooth errors need to know how alike the postures are"));
         }
         None => {}
     }
+    match &options.links {
+        Some(links) => links.check(views.len())?,
+        None if hypotheses.iter().any(|h| h.nature == Nature::Links) => {
+            return Err(Error::invalid("errors of the links need the arm's Jacobians"));
+        }
+        None => {}
+    }
+    let smooth = |i: &usize| hypotheses[*i].nature == Nature::Smooth;
     let (mut x, mut y) = start;
     let mut focus: Option<Vec<usize>> = None;
     let mut worth: Vec<usize> = (0..hypotheses.len()).collect();
@@ -130,7 +147,7 @@ pub fn estimate(
         let mut chosen = if last { worth.clone() } else { focus.clone().unwrap_or_else(|| worth.clone()) };
         if !last {
             // Smooth errors say how far the answer may be off, not what it is.
-            chosen.retain(|i| !hypotheses[*i].smooth);
+            chosen.retain(|i| !smooth(i));
         }
         let prepared = prepare(views, variances_px2, &x, &y, options.joints.as_ref());
         let camera = camera_terms(views, variances_px2, &options.camera_prior);
@@ -140,7 +157,7 @@ pub fn estimate(
             .iter()
             .filter_map(|i| {
                 if !sums.as_ref().is_some_and(|(j, _)| hypotheses[*j].same_noise(&hypotheses[*i])) {
-                    sums = Some((*i, sum_up(&prepared, &hypotheses[*i], options.smooth.as_ref())));
+                    sums = Some((*i, sum_up(&prepared, &hypotheses[*i], options)));
                 }
                 let sums = sums.as_ref()?.1.as_ref()?;
                 let linear = linearise(sums, &hypotheses[*i], &x, options, &camera)?;
@@ -155,7 +172,7 @@ pub fn estimate(
         if round == 0 && options.joints.is_some() {
             // Offsets multiply the grid; what is hopeless at the first linearisation stays so.
             worth = evaluated.iter().filter(|e| e.2 > best - HOPELESS).map(|e| e.0).collect();
-            worth.extend((0..hypotheses.len()).filter(|i| hypotheses[*i].smooth));
+            worth.extend((0..hypotheses.len()).filter(smooth));
         }
         let total: f64 = evaluated.iter().map(|e| (e.2 - best).exp()).sum();
         let mean = average(&evaluated, hypotheses, 12 + n_c + n_q);
@@ -168,7 +185,7 @@ pub fn estimate(
         y = Se3::exp(&Vector6::from_column_slice(&mean.as_slice()[6..12])) * y;
         let mut order: Vec<(usize, f64)> = evaluated.iter().map(|e| (e.0, e.2)).collect();
         order.sort_by(|a, b| b.1.total_cmp(&a.1));
-        focus = Some(order.iter().map(|o| o.0).filter(|i| !hypotheses[*i].smooth).take(8).collect());
+        focus = Some(order.iter().map(|o| o.0).filter(|i| !smooth(i)).take(8).collect());
         if step < STEP_TOLERANCE && round > 0 {
             // The chain stands: go to the last round, which weighs the whole grid.
             focus = None;
@@ -179,17 +196,19 @@ pub fn estimate(
     Ok(Posterior {
         camera_delta: mean.rows(12, n_c).into_owned(),
         joint_offsets: mean.rows(12 + n_c, n_q).into_owned(),
+        link_twists: expected_links(&evaluated, hypotheses, options.links.as_ref()),
         ..posterior
     })
 }
 
-/// The answer: averaged over the hypotheses whose errors are another in each view.
+/// The answer: averaged over all hypotheses but those of errors that are smooth for reasons unknown.
 ///
 /// What of a smooth error all views share cannot be told from `X` and `Y`, and the robot errs so again when it goes
 /// where the views were: taking it up predicts better than leaving it out (held-out views of real arms). How far the
-/// truth may be from such an answer is in the covariance, which counts all hypotheses.
+/// truth may be from such an answer is in the covariance, which counts all hypotheses. Where it is known how the
+/// links move the arm, their errors come out as such and can be put right in every pose.
 fn average(evaluated: &[(usize, Linear, f64)], hypotheses: &[Hypothesis], n: usize) -> DVector<f64> {
-    let chosen = || evaluated.iter().filter(|e| !hypotheses[e.0].smooth);
+    let chosen = || evaluated.iter().filter(|e| hypotheses[e.0].nature != Nature::Smooth);
     let best = chosen().map(|e| e.2).fold(f64::NEG_INFINITY, f64::max);
     let mut mean = DVector::zeros(n);
     let mut total = 0.0;
@@ -199,6 +218,24 @@ fn average(evaluated: &[(usize, Linear, f64)], hypotheses: &[Hypothesis], n: usi
         total += weight;
     }
     mean / total
+}
+
+/// By how much the joints are displaced: averaged as the answer is, nothing where the links are exact.
+fn expected_links(
+    evaluated: &[(usize, Linear, f64)],
+    hypotheses: &[Hypothesis],
+    links: Option<&LinkErrors>,
+) -> DVector<f64> {
+    let mut mean = DVector::zeros(links.map_or(0, LinkErrors::coefficients));
+    let chosen = || evaluated.iter().filter(|e| hypotheses[e.0].nature != Nature::Smooth);
+    let best = chosen().map(|e| e.2).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = chosen().map(|e| (e.2 - best).exp()).sum();
+    for (_, linear, log) in chosen() {
+        if let Some(twists) = &linear.link_twists {
+            mean += twists * ((log - best).exp() / total);
+        }
+    }
+    mean
 }
 
 fn finish(
@@ -240,6 +277,7 @@ fn finish(
         y: Se3::exp(&Vector6::from_column_slice(&mean.as_slice()[6..12])) * y,
         camera_delta: DVector::zeros(0),
         joint_offsets: DVector::zeros(0),
+        link_twists: DVector::zeros(0),
         weights,
         informations,
         covariance,
@@ -315,18 +353,22 @@ fn robot_root(view: &View, hypothesis: &Hypothesis) -> Option<Matrix6<f64>> {
     Some(root)
 }
 
-fn sum_up(views: &[View], hypothesis: &Hypothesis, smooth: Option<&SmoothError>) -> Option<Sums> {
+fn sum_up(views: &[View], hypothesis: &Hypothesis, options: &EvidenceOptions) -> Option<Sums> {
     let n = views.first()?.rows.ncols() - 1;
-    let smooth = smooth.filter(|_| hypothesis.smooth);
-    let n_s = smooth.map_or(0, SmoothError::coefficients);
+    let smooth = options.smooth.as_ref().filter(|_| hypothesis.nature == Nature::Smooth);
+    let links = options.links.as_ref().filter(|_| hypothesis.nature == Nature::Links);
+    let n_s = smooth.map_or(0, SmoothError::coefficients) + links.map_or(0, LinkErrors::coefficients);
+    let levels = (hypothesis.translation_m, hypothesis.rotation_rad);
     let mut sums = DMatrix::zeros(n_s + n + 1, n_s + n + 1);
     let mut log_determinant = 0.0;
-    // Coefficients of the smooth error come first: eliminating them is then the start of a factorisation.
+    // Coefficients of what views share come first: eliminating them is then the start of a factorisation.
     let mut whitened = DMatrix::zeros(6, n_s + n + 1);
     for (k, view) in views.iter().enumerate() {
         let mut covariance = view.pixel_covariance;
         if hypothesis.joint_rad > 0.0 {
             covariance += view.joints? * hypothesis.joint_rad.powi(2);
+        } else if let Some(links) = links {
+            covariance += links.fill(k, &view.left, levels, &mut whitened);
         } else if let Some(root) = robot_root(view, hypothesis) {
             covariance += root * root.transpose() * smooth.map_or(1.0, |s| s.own(k));
             if let Some(smooth) = smooth {
@@ -349,7 +391,7 @@ fn sum_up(views: &[View], hypothesis: &Hypothesis, smooth: Option<&SmoothError>)
         sums.gemm_tr(1.0, &whitened, &whitened, 1.0);
     }
     if n_s == 0 {
-        return Some(Sums { products: sums, log_determinant });
+        return Some(Sums { products: sums, log_determinant, shared: None });
     }
     // Integrate the coefficients out, each of variance one beforehand.
     let own = sums.view((0, 0), (n_s, n_s)) + DMatrix::identity(n_s, n_s);
@@ -359,7 +401,7 @@ fn sum_up(views: &[View], hypothesis: &Hypothesis, smooth: Option<&SmoothError>)
     let explained = factor.l().solve_lower_triangular(&across)?;
     let mut products = sums.view((n_s, n_s), (n + 1, n + 1)).into_owned();
     products.gemm_tr(-1.0, &explained, &explained, 1.0);
-    Some(Sums { products, log_determinant })
+    Some(Sums { products, log_determinant, shared: Some((factor, across)) })
 }
 
 fn linearise(
@@ -396,7 +438,16 @@ fn linearise(
     let minus_two_log_likelihood =
         sums.log_determinant + sums.products[(n, n)] - theta.dot(&right) + information_log_determinant;
     let minus_two_log_likelihood = minus_two_log_likelihood + log_prior_determinant;
-    Some(Linear { information, theta, minus_two_log_likelihood })
+    let link_twists =
+        sums.shared.as_ref().filter(|_| hypothesis.nature == Nature::Links).and_then(|shared| {
+            let links = options.links.as_ref()?;
+            let mut twists = -shared.0.solve(&(shared.1.columns(0, n) * &theta + shared.1.column(n)));
+            for (i, twist) in twists.iter_mut().enumerate() {
+                *twist *= links.deviation(i, hypothesis.translation_m, hypothesis.rotation_rad);
+            }
+            Some(twists)
+        });
+    Some(Linear { information, theta, link_twists, minus_two_log_likelihood })
 }
 
 /// Solution and log-determinant of a positive definite system whose units differ by orders of magnitude.

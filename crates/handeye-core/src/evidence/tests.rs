@@ -42,6 +42,7 @@ fn run_with(views: &[CompressedView], joints: Option<JointErrors>, hypotheses: &
         camera_prior: DMatrix::zeros(0, 0),
         joints,
         smooth: None,
+        links: None,
         linearisations: 4,
     };
     estimate(&views, &variances, hypotheses, (start.x, start.y), &options).unwrap()
@@ -144,7 +145,7 @@ fn misread(cell: &Cell, arm: &JointErrors, noise: f64, offsets: &[f64], seed: u6
 
 fn joint_grid() -> Vec<Hypothesis> {
     let prior = JointPrior::default();
-    let noise = LevelPrior::default().grid_with(&[Side::Left, Side::Right], Some(&prior.noise));
+    let noise = LevelPrior::default().grid_with(&[Side::Left, Side::Right], Some(&prior.noise), None);
     prior.with_offsets(&noise)
 }
 
@@ -196,6 +197,7 @@ fn joint_errors_that_do_not_fit_are_refused() {
             camera_prior,
             joints,
             smooth: None,
+            links: None,
             linearisations: 2,
         };
         estimate(&views, &[0.01; 4], &joint_grid(), (cell.x, cell.y), &options)
@@ -240,6 +242,7 @@ fn smooth_errors_are_told_from_white_ones_and_widen_the_region() {
             camera_prior: DMatrix::zeros(0, 0),
             joints: None,
             smooth: Some(smooth.clone()),
+            links: None,
             linearisations: 4,
         };
         let posterior = estimate(&views, &variances, &hypotheses, (white.x, white.y), &options).unwrap();
@@ -248,7 +251,7 @@ fn smooth_errors_are_told_from_white_ones_and_widen_the_region() {
         let wider = posterior.covariance.fixed_view::<6, 6>(0, 0).trace()
             / white.covariance.fixed_view::<6, 6>(0, 0).trace();
         let weights = hypotheses.iter().zip(&posterior.weights);
-        (weights.filter(|(h, _)| h.smooth).map(|(_, w)| w).sum::<f64>(), wider)
+        (weights.filter(|(h, _)| h.nature == Nature::Smooth).map(|(_, w)| w).sum::<f64>(), wider)
     };
     for seed in 0..5 {
         let (smooth, wider) = probability(true, seed);
@@ -265,4 +268,77 @@ fn likenesses_that_are_none_are_refused() {
     assert!(SmoothError::new(&DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 0.0, 1.0])).is_err());
     assert!(SmoothError::new(&DMatrix::from_row_slice(2, 2, &[1.0, 1.5, 1.5, 1.0])).is_err());
     assert!(SmoothError::new(&DMatrix::from_element(2, 3, 1.0)).is_err());
+}
+
+/// An arm whose joints are displaced: the hypothesis wins, the answer is better, and so is what is said of the links.
+#[test]
+fn displaced_joints_are_told_from_other_errors_and_predicted() {
+    let (views, ways) = (12, 10);
+    let grid =
+        LevelPrior::default().grid_with(&[Side::Left, Side::Right], None, Some(&LevelPrior::of_links()));
+    let (mut of_links, mut better, mut explained) = (0.0, 0.0, 0.0);
+    let trials = 12;
+    for seed in 0..trials {
+        let cell = Cell::new(3000 + seed, views);
+        let mut random = Random::new(seed);
+        let links = LinkErrors {
+            jacobians: (0..views)
+                .map(|_| DMatrix::from_fn(6, ways, |_, _| random.uniform(-0.7, 0.7)))
+                .collect(),
+            lengths: (0..ways).map(|i| i % 2 == 0).collect(),
+        };
+        let truth: Vec<f64> =
+            links.lengths.iter().map(|long| random.normal() * if *long { 5e-4 } else { 1e-3 }).collect();
+        let twist = nalgebra::DVector::from_column_slice(&truth);
+        let reported: Vec<Se3> = cell
+            .motions
+            .iter()
+            .zip(&links.jacobians)
+            .map(|(a, l)| Se3::exp(&Vector6::from_column_slice((l * &twist).as_slice())).inverse() * *a)
+            .collect();
+        let seen = compressed(&cell, &reported, 0.1, seed);
+        let chosen: Vec<&CompressedView> = seen.iter().collect();
+        let variances = shrunk_variances(&chosen, 20.0, 1e-12);
+        let options = EvidenceOptions {
+            prior: WeakPrior::default(),
+            camera_prior: DMatrix::zeros(0, 0),
+            joints: None,
+            smooth: None,
+            links: Some(links),
+            linearisations: 4,
+        };
+        let posterior = estimate(&chosen, &variances, &grid, (cell.x, cell.y), &options).unwrap();
+        let probability = |h: &&Hypothesis| h.nature == Nature::Links;
+        of_links +=
+            grid.iter().zip(&posterior.weights).filter(|(h, _)| probability(h)).map(|(_, w)| w).sum::<f64>()
+                / trials as f64;
+        let error = (posterior.x * cell.x.inverse()).log().norm();
+        let blind = (run(&seen).x * cell.x.inverse()).log().norm();
+        better += (blind / error).ln() / trials as f64;
+        explained += (&posterior.link_twists - &twist).norm() / twist.norm() / trials as f64;
+    }
+    assert!(of_links > 0.9, "{of_links}");
+    assert!(better > 1.0, "{better}");
+    assert!(explained < 0.3, "{explained}");
+}
+
+#[test]
+fn links_that_do_not_fit_the_views_are_refused() {
+    let cell = Cell::new(1, 5);
+    let views = compressed(&cell, &cell.motions, 0.1, 1);
+    let chosen: Vec<&CompressedView> = views.iter().collect();
+    let grid = [Hypothesis::links(1e-3, 1e-3, 0.0)];
+    for links in [None, Some(LinkErrors { jacobians: vec![DMatrix::zeros(6, 2); 4], lengths: vec![true; 2] })]
+    {
+        let options = EvidenceOptions {
+            prior: WeakPrior::default(),
+            camera_prior: DMatrix::zeros(0, 0),
+            joints: None,
+            smooth: None,
+            links,
+            linearisations: 2,
+        };
+        let error = estimate(&chosen, &[0.01; 5], &grid, (cell.x, cell.y), &options).unwrap_err();
+        assert!(error.to_string().contains("link"), "{error}");
+    }
 }
