@@ -361,7 +361,7 @@ impl Model {
 
 /// `F` with `F F' = m` for a positive semi-definite `m`: Cholesky with diagonal pivoting, which leaves the columns of
 /// null directions zero (Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., 2002, section 10.3).
-fn semidefinite_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn semidefinite_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
     let n = m.nrows();
     let scale: Vec<f64> = (0..n).map(|i| m[(i, i)].abs()).collect();
     let mut left: Vec<usize> = (0..n).collect();
