@@ -11,6 +11,7 @@ mod hypotheses;
 mod joints;
 mod posterior;
 mod smooth;
+mod weigh;
 
 pub use chain::{ChainStart, WeakPrior, start_from_poses};
 pub use compressed::{CompressedView, compress, shrunk_variances};
