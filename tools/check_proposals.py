@@ -27,7 +27,8 @@ import cv2
 import numpy as np
 
 from handeye.planning.collisions import Workspace
-from handeye.planning.feasibility import Generator, ViewLimits, mounted_points
+from handeye.planning.feasibility import Generator
+from handeye.planning.sieve import ViewLimits, mounted_points
 from handeye.session.configuration import Configuration, Prepared, Simulation, begin, prepare
 from handeye.session.entry import Failure
 from handeye.session.loop import End, Session, Step

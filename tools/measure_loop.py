@@ -2,6 +2,7 @@
 
 .venv/bin/python tools/measure_loop.py --cells 24 --output out/loop.jsonl
 .venv/bin/python tools/measure_loop.py --faults --cells 20 --output out/faults.jsonl
+.venv/bin/python tools/measure_loop.py --views 8 --no-refine --cells 12 --output out/eight_as_drawn.jsonl
 
 One line per cell is appended to the output, cells that are there already are not run again: a long
 measurement can be made in parts. At the end the file is summed up. Points are projected with noise.
@@ -85,9 +86,11 @@ def run(configuration: Configuration) -> dict[str, Any]:
         session, store = begin(prepared, Path(folder) / "session")
         try:
             end = session.run()
+            decisions = [entry.decision for entry in store.entries]
         finally:
             store.close()
     line: dict[str, Any] = {"end": end.reason.value, "views": end.views, "attempts": end.attempts}
+    line["gains"] = [decision["predicted_gain"] for decision in decisions if "predicted_gain" in decision]
     if end.calibration is not None and end.reach is not None:
         off = (end.calibration.X @ prepared.truth.X.inverse()).log()
         line |= {
@@ -110,6 +113,10 @@ def main() -> int:
     parser.add_argument(
         "--beside", type=int, default=40, help="fault runs that have an undisturbed one beside"
     )
+    parser.add_argument(
+        "--no-refine", action="store_true", help="take the best candidate drawn, climb to no better one"
+    )
+    parser.add_argument("--views", type=int, help="take so many views whatever is reached")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
     parser.add_argument("--output", type=Path, required=True)
     options = parser.parse_args()
@@ -132,7 +139,10 @@ def main() -> int:
                         calm = replace(configuration.simulation, faults=None)
                         line["undisturbed"] = run(replace(configuration, simulation=calm))
                 else:
-                    line |= run(cell(kind, number))
+                    configuration = replace(cell(kind, number), refine=not options.no_refine)
+                    if options.views is not None:
+                        configuration = replace(configuration, accuracy_mm=None, most_views=options.views)
+                    line |= run(configuration)
                 file.write(json.dumps(line) + "\n")
                 file.flush()
                 lines.append(line)
@@ -159,6 +169,13 @@ def _sum_up(lines: list[dict[str, Any]]) -> None:
             f"{sum(map(_inside, ended))} of these inside by the truth, {views:.1f} views, "
             f"{failed} failed attempts, longest {max(e['seconds'] for e in some):.0f} s"
         )
+        errors, reached_mm = ([line[key] for line in some if key in line] for key in ("mm", "promised_mm"))
+        first = [line["gains"][0] for line in some if line.get("gains")]
+        if errors and first:
+            print(
+                f"  median error {np.median(errors):.3f} mm, median radius stated "
+                f"{np.median(reached_mm):.3f} mm, mean gain of the first planned view {np.mean(first):.2f}"
+            )
         if kind == "faults":
             calm = [line["undisturbed"] for line in some if "mm" in line.get("undisturbed", {})]
             mean, beside = (np.mean([line["mm"] for line in part]) for part in (ended, calm))

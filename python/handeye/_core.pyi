@@ -311,6 +311,21 @@ class Predictor:
         `threads` (0: as many as pay off) and `vector_unit` change nothing beyond rounding.
         """
 
+    def mean_gains(
+        self,
+        supposed: list[tuple[float, Belief, str | None, ArrayLike | None]],
+        criterion: Criterion,
+        motions: ArrayLike,
+        *,
+        threads: int = 0,
+        vector_unit: str | None = None,
+    ) -> NDArray[float64]:
+        """Gain (N,) of each candidate, averaged over what the robot's error may be.
+
+        `supposed`: weight, belief, `robot_side` and `robot_root`, in place of the predictor's own. The points of
+        a candidate are looked at once.
+        """
+
     def informations(self, motions: ArrayLike, *, jacobians: ArrayLike | None = None) -> NDArray[float64]:
         """Information (N, n, n) of each candidate; zero where too little would be in sight."""
 

@@ -182,3 +182,17 @@ def test_the_decisions_say_how_they_came_about(tmp_path: Path) -> None:
         assert entry.decision["turned_down"]
         assert entry.decision["margin_px"] >= 20.0
     assert end.views >= len(planned)
+    # Most steps climb to something better than what was drawn, and say from where.
+    climbed = [entry.decision for entry in planned if "refined" in entry.decision]
+    assert climbed
+    for decision in climbed:
+        assert decision["refined"]["from"] in decision["candidates"]
+        assert decision["refined"]["seed_gain"] < decision["predicted_gain"]
+
+
+def test_refinement_can_be_left_away(tmp_path: Path) -> None:
+    _, _, store = ended(configured(5, refine=False, most_views=4), tmp_path / "s")
+    planned = [entry.decision for entry in store.entries if entry.phase == "plan"]
+    assert planned
+    assert not any("refined" in decision for decision in planned)
+    assert all(name.startswith("candidate_") for name in planned[0]["candidates"])

@@ -5,11 +5,11 @@ use handeye_core::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, ToolPoint, Trace,
 };
 use handeye_core::information::{
-    Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, Sight,
+    Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, Sight, Supposition,
 };
-use handeye_core::least_squares::PixelParameters;
+use handeye_core::least_squares::{PixelParameters, Side};
 use handeye_core::simd::VectorUnit;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix6};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
@@ -140,6 +140,23 @@ fn vector_unit(py: Python<'_>, name: &str) -> PyResult<VectorUnit> {
         })
 }
 
+/// Weight, belief, and side and root of the robot's error.
+type Supposed<'py> = (f64, Bound<'py, Belief>, Option<String>, Option<Array<'py>>);
+
+fn robot(
+    py: Python<'_>,
+    robot_side: Option<&str>,
+    robot_root: Option<&Array<'_>>,
+) -> PyResult<Option<(Side, Matrix6<f64>)>> {
+    match (robot_side, robot_root) {
+        (None, None) => Ok(None),
+        (Some(name), Some(root)) => {
+            Ok(Some((side(py, name)?, convert::matrix::<6, 6>(py, "robot_root", root)?)))
+        }
+        _ => Err(invalid(py, "robot_side and robot_root go together")),
+    }
+}
+
 /// Predicts what candidate views would tell.
 #[pyclass(frozen, module = "handeye._core")]
 pub struct Predictor {
@@ -148,7 +165,7 @@ pub struct Predictor {
     y: handeye_core::se3::Se3,
     features: Vec<handeye_core::camera::Feature>,
     pixel_sigma: f64,
-    robot: Option<(handeye_core::least_squares::Side, nalgebra::Matrix6<f64>)>,
+    robot: Option<(Side, Matrix6<f64>)>,
     pixel_parameters: Option<PixelParameters>,
     free_joints: Vec<usize>,
     joint_noise: Option<Vec<f64>>,
@@ -174,6 +191,35 @@ impl Predictor {
             return Err(invalid(py, "joint Jacobians: as many as motions, with a column for every joint"));
         }
         Ok(Some(jacobians.iter().map(|d| CandidateJoints::new(d, &self.free_joints, noise)).collect()))
+    }
+
+    /// Gains in lanes; `threads` and `vector_unit` as Python gives them.
+    fn scored<'py>(
+        &self,
+        py: Python<'py>,
+        supposed: &[Supposition<'_>],
+        criterion: &PyCriterion,
+        motions: &Array<'py>,
+        (threads, vector_unit): (usize, Option<&str>),
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let unit =
+            vector_unit.map_or_else(|| Ok(VectorUnit::widest()), |name| self::vector_unit(py, name))?;
+        let matrices = convert::row_major::<4, 4>(py, "motions", motions)?;
+        let matrices: &[f64] = &matrices;
+        let outcome = py.detach(|| {
+            let execution = Execution { unit, threads };
+            let criterion = criterion.inner.as_ref();
+            self.model().mean_gains(supposed, criterion, Motions::Matrices(matrices), &execution)
+        });
+        match outcome {
+            Ok(gains) => Ok(convert::scalars_out(py, gains)),
+            Err(error @ Error::NotRigid { .. }) => {
+                // Once more, to say which.
+                convert::transforms(py, "motions", motions)?;
+                Err(to_python(py, error))
+            }
+            Err(error) => Err(to_python(py, error)),
+        }
     }
 
     fn model(&self) -> CandidateModel<'_> {
@@ -222,13 +268,7 @@ impl Predictor {
         if !(pixel_sigma > 0.0 && pixel_sigma.is_finite()) {
             return Err(invalid(py, "pixel_sigma must be positive"));
         }
-        let robot = match (robot_side, robot_root) {
-            (None, None) => None,
-            (Some(name), Some(root)) => {
-                Some((side(py, name)?, convert::matrix::<6, 6>(py, "robot_root", &root)?))
-            }
-            _ => return Err(invalid(py, "robot_side and robot_root go together")),
-        };
+        let robot = robot(py, robot_side, robot_root.as_ref())?;
         let free = free_camera.unwrap_or_default();
         let count = free.len() + usize::from(board_scale);
         let pixel_parameters = (count > 0).then(|| PixelParameters {
@@ -274,24 +314,30 @@ impl Predictor {
                 .map_err(|e| to_python(py, e))?;
             return Ok(convert::scalars_out(py, gains));
         }
-        let unit =
-            vector_unit.map_or_else(|| Ok(VectorUnit::widest()), |name| self::vector_unit(py, name))?;
-        let matrices = convert::row_major::<4, 4>(py, "motions", &motions)?;
-        let matrices: &[f64] = &matrices;
-        let outcome = py.detach(|| {
-            let execution = Execution { unit, threads };
-            let criterion = criterion.inner.as_ref();
-            self.model().gains_by(&belief.inner, criterion, Motions::Matrices(matrices), &execution)
-        });
-        match outcome {
-            Ok(gains) => Ok(convert::scalars_out(py, gains)),
-            Err(error @ Error::NotRigid { .. }) => {
-                // Once more, to say which.
-                convert::transforms(py, "motions", &motions)?;
-                Err(to_python(py, error))
-            }
-            Err(error) => Err(to_python(py, error)),
-        }
+        let supposed = Supposition { weight: 1.0, belief: &belief.inner, robot: self.robot };
+        self.scored(py, &[supposed], criterion, &motions, (threads, vector_unit))
+    }
+
+    /// Gain of each candidate motion, averaged over what the robot's error may be, each with its weight, belief, side
+    /// and root, in place of the predictor's own.
+    #[pyo3(signature = (supposed, criterion, motions, *, threads=0, vector_unit=None))]
+    fn mean_gains<'py>(
+        &self,
+        py: Python<'py>,
+        supposed: Vec<Supposed<'py>>,
+        criterion: &PyCriterion,
+        motions: Array<'py>,
+        threads: usize,
+        vector_unit: Option<&str>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let supposed = supposed
+            .iter()
+            .map(|(weight, belief, side, root)| {
+                let robot = robot(py, side.as_deref(), root.as_ref())?;
+                Ok(Supposition { weight: *weight, belief: &belief.get().inner, robot })
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        self.scored(py, &supposed, criterion, &motions, (threads, vector_unit))
     }
 
     /// Information `(N, n, n)` of each candidate motion; zero where too little would be in sight.

@@ -16,7 +16,7 @@ from handeye.cli.output import check_new_folder
 from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
-from handeye.planning.feasibility import ViewLimits
+from handeye.planning.sieve import ViewLimits
 from handeye.robots.manual import describe
 from handeye.robots.notations import Notation
 from handeye.robots.protocol import Goal
@@ -116,6 +116,7 @@ def run(
     seed: int = 0,
     model: ModelName = ModelName.AUTO,
     policy: str = "next_best_view",
+    refine: bool = True,
     resume: bool = False,
     dry_run: bool = False,
     confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
@@ -160,6 +161,8 @@ def run(
     policy
         How the next view is chosen: next_best_view, gain_per_second (the gain over the time that motion and
         view take), random or max_distance.
+    refine
+        Climb from the best candidates to better ones near them; without it the best that was drawn is taken.
     resume
         Go on with a session; everything else is taken from it.
     dry_run
@@ -183,6 +186,7 @@ def run(
         seed=seed,
         model=model,
         policy=policy,
+        refine=refine,
         speed_rad_s=float(np.deg2rad(limits.speed_deg_s)),
         workspace_m=_box(limits.workspace_mm),
         floor_m=limits.floor_mm / MM_PER_M,

@@ -5,6 +5,8 @@ coarse on purpose: it needs no meshes, and the radius can be chosen larger than 
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +18,8 @@ from handeye.types.arrays import FloatArray, finite_array
 
 # Frames nearer to each other than this are one point.
 _SHORTEST_LINK_M = 1e-3
+# No joint moves farther between two postures at which a path is looked at.
+_PATH_STEP_RAD = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,34 +113,72 @@ class Body:
                 answers.append(None)
         return answers
 
-    def obstacle_on_path(self, start: ArrayLike, end: ArrayLike, *, step_rad: float = 0.05) -> str | None:
+    def obstacle_on_path(self, start: ArrayLike, end: ArrayLike) -> str | None:
         """Say what is in the way of the straight motion in joint space from posture to posture (n,)."""
-        first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-        count = max(2, int(np.ceil(np.abs(last - first).max() / step_rad)) + 1)
-        path = first + np.linspace(0, 1, count)[:, np.newaxis] * (last - first)
+        return self.obstacles_on_paths(start, np.asarray(end, dtype=np.float64)[np.newaxis])[0]
+
+    def obstacles_on_paths(self, start: ArrayLike, ends: FloatArray) -> list[str | None]:
+        """Say for each posture (N, n) what is in the way of the straight motion there from a posture (n,)."""
+        paths = [straight_path(start, end) for end in ends]
+        if not paths:
+            return []
         # The start is where the arm stands, allowed or not: only leaving it can be judged.
-        return next((why for why in self.obstacles(path[1:]) if why is not None), None)
+        why = self.obstacles(np.concatenate([path[1:] for path in paths]))
+        bounds = np.cumsum([0, *(len(path) - 1 for path in paths)])
+        return [
+            next((reason for reason in why[a:b] if reason is not None), None)
+            for a, b in pairwise(bounds.tolist())
+        ]
+
+    @cached_property
+    def _links(self) -> list[tuple[int, int]]:
+        """Pairs of frames that have a link between them, base first."""
+        rest = frames_of(self.arm, np.zeros((1, len(self.arm))))[0, :, :3, 3]
+        pairs: list[tuple[int, int]] = []
+        start = 0
+        for end in range(1, len(self.arm) + 2):
+            if np.linalg.norm(rest[end] - rest[start]) > _SHORTEST_LINK_M:
+                pairs.append((start, end))
+                start = end
+        return pairs
+
+    @cached_property
+    def _may_touch(self) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+        """Pairs of links that are not near each other by construction, with little between them."""
+        rest = frames_of(self.arm, np.zeros((1, len(self.arm))))[0, :, :3, 3]
+        links = self._links
+        length = np.array([np.linalg.norm(rest[b] - rest[a]) for a, b in links])
+        near = 2 * self.workspace.link_radius_m + 0.02
+        return [
+            (links[i], links[j])
+            for i in range(len(links))
+            for j in range(i + 2, len(links))
+            if length[i + 1 : j].sum() >= near
+        ]
 
     def _touches_itself(self, frames: FloatArray, tools: FloatArray) -> FloatArray:
-        links = _links(self.arm)
-        touching = np.zeros(len(frames), dtype=bool)
-        radius = self.workspace.link_radius_m
-        length = np.array([np.inf if b <= a else _rest_length(self.arm, a, b) for a, b in links])
-        for i in range(len(links)):
-            for j in range(i + 2, len(links)):
-                # Links with little between them are near each other by construction.
-                if length[i + 1 : j].sum() < 2 * radius + 0.02:
-                    continue
-                (a, b), (c, d) = links[i], links[j]
-                gap = _segment_distance(
-                    frames[:, a, :3, 3], frames[:, b, :3, 3], frames[:, c, :3, 3], frames[:, d, :3, 3]
-                )
-                touching |= gap < 2 * radius
-        for a, b in links[: max(len(links) - 3, 0)]:
-            for t in range(tools.shape[1]):
-                gap = _segment_distance(frames[:, a, :3, 3], frames[:, b, :3, 3], tools[:, t], tools[:, t])
-                touching |= gap < radius + self.workspace.tool_radius_m
-        return touching
+        space, origins = self.workspace, frames[:, :, :3, 3]
+        gaps: list[FloatArray] = []
+        if self._may_touch:
+            (a, b), (c, d) = np.array(self._may_touch).transpose(1, 2, 0)
+            gap = _segment_distance(origins[:, a], origins[:, b], origins[:, c], origins[:, d])
+            gaps.append(gap - 2 * space.link_radius_m)
+        if len(self._links) > 3 and tools.shape[1] > 0:
+            a, b = np.array(self._links[:-3]).T
+            ball = np.repeat(tools, len(a), axis=1)
+            many = np.tile(a, tools.shape[1]), np.tile(b, tools.shape[1])
+            gap = _segment_distance(origins[:, many[0]], origins[:, many[1]], ball, ball)
+            gaps.append(gap - space.link_radius_m - space.tool_radius_m)
+        if not gaps:
+            return np.zeros(len(frames), dtype=bool)
+        return np.concatenate(gaps, axis=1).min(axis=1) < 0
+
+
+def straight_path(start: ArrayLike, end: ArrayLike) -> FloatArray:
+    """(M, n) postures on the straight line in joint space, both ends among them, close to one another."""
+    first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    count = max(2, int(np.ceil(np.abs(last - first).max() / _PATH_STEP_RAD)) + 1)
+    return first + np.linspace(0, 1, count)[:, np.newaxis] * (last - first)
 
 
 def frames_of(arm: Arm, joints: ArrayLike) -> FloatArray:
@@ -154,31 +196,15 @@ def frames_of(arm: Arm, joints: ArrayLike) -> FloatArray:
     return frames
 
 
-def _links(arm: Arm) -> list[tuple[int, int]]:
-    """Return pairs of frames that have a link between them, base first."""
-    pairs: list[tuple[int, int]] = []
-    start = 0
-    for end in range(1, len(arm) + 2):
-        if _rest_length(arm, start, end) > _SHORTEST_LINK_M:
-            pairs.append((start, end))
-            start = end
-    return pairs
-
-
-def _rest_length(arm: Arm, start: int, end: int) -> float:
-    frames = frames_of(arm, np.zeros((1, len(arm))))[0]
-    return float(np.linalg.norm(frames[end, :3, 3] - frames[start, :3, 3]))
-
-
 def _segment_distance(p0: FloatArray, p1: FloatArray, q0: FloatArray, q1: FloatArray) -> FloatArray:
-    """(N,) distance between segments p0 p1 and q0 q1, each (N, 3) (Ericson 2005, section 5.1.9)."""
+    """(...) distance between segments p0 p1 and q0 q1, each (..., 3) (Ericson 2005, section 5.1.9)."""
     d1, d2, r = p1 - p0, q1 - q0, p0 - q0
-    a, e = np.einsum("ni,ni->n", d1, d1), np.einsum("ni,ni->n", d2, d2)
-    b, c, f = (np.einsum("ni,ni->n", x, y) for x, y in ((d1, d2), (d1, r), (d2, r)))
+    a, e = np.einsum("...i,...i", d1, d1), np.einsum("...i,...i", d2, d2)
+    b, c, f = (np.einsum("...i,...i", x, y) for x, y in ((d1, d2), (d1, r), (d2, r)))
     tiny = 1e-12
     determinant = a * e - b * b
     s = np.clip(np.where(determinant > tiny, (b * f - c * e) / np.maximum(determinant, tiny), 0.0), 0, 1)
     t = np.where(e > tiny, (b * s + f) / np.maximum(e, tiny), 0.0)
     clamped = np.clip(t, 0, 1)
     s = np.where(a > tiny, np.clip((b * clamped - c) / np.maximum(a, tiny), 0, 1), 0.0)
-    return np.linalg.norm((p0 + s[:, np.newaxis] * d1) - (q0 + clamped[:, np.newaxis] * d2), axis=1)
+    return np.linalg.norm((p0 + s[..., np.newaxis] * d1) - (q0 + clamped[..., np.newaxis] * d2), axis=-1)

@@ -1,65 +1,32 @@
 """Robot poses that could be taken next: around the target and around the arm's own postures, then sifted."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from handeye.errors import InputError
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Body, Workspace
-from handeye.planning.visibility import obstacles
+from handeye.planning.sieve import Sieve, ViewLimits, mounted_points, sight_of
 from handeye.robots import Arm
 from handeye.solving.estimate import Estimate, Sight
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
 
 
-@dataclass(frozen=True)
-class ViewLimits:
-    """What makes a view of the target usable.
-
-    Parameters
-    ----------
-    distance_m
-        Nearest and farthest distance of the camera from the middle of the target.
-    tilt_rad
-        Largest angle between the line of sight and the normal of the target.
-    margin_px
-        Distance of every point from the border of the image, besides what the estimate may be off.
-    fewest
-        Fewest points in sight; None for all.
-
-    Raises
-    ------
-    InputError
-        A range without inside.
-    """
-
-    distance_m: tuple[float, float] = (0.25, 0.9)
-    tilt_rad: float = float(np.deg2rad(45.0))
-    margin_px: float = 20.0
-    fewest: int | None = None
-
-    def __post_init__(self) -> None:
-        near, far = self.distance_m
-        if not 0 < near < far < float("inf") or not 0 < self.tilt_rad < np.pi / 2 or self.margin_px < 0:
-            raise InputError(
-                f"views from {near} to {far} m, tilted up to {np.rad2deg(self.tilt_rad):.0f} deg, margin "
-                f"{self.margin_px} px: expected ranges with an inside",
-                code="out_of_range",
-            )
-
-
 @dataclass(frozen=True, eq=False)
 class FeasiblePool:
-    """Candidates with the joints that reach them, and how many were turned down for which reason."""
+    """Candidates with the joints that reach them, how many were turned down for which reason, and by what."""
 
     pool: Pool
     joints: Mapping[str, FloatArray]
     turned_down: Mapping[str, int]
-    sight: Sight
+    sieve: Sieve
+
+    @property
+    def sight(self) -> Sight:
+        """What every candidate shows of the target."""
+        return self.sieve.sight
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,26 +85,23 @@ class Generator:
         """
         taken = np.array(postures, dtype=np.float64)
         joints = np.concatenate([self._on_shell(estimate, taken, random), self._in_joints(taken, random)])
-        turned_down: Counter[str] = Counter()
-        turned_down["the arm does not reach the pose"] = (
-            self.around_target + self.around_postures - len(joints)
+        unreached = self.around_target + self.around_postures - len(joints)
+        sieve = Sieve(
+            self.body(estimate),
+            estimate,
+            self.limits,
+            sight_of(estimate, self.limits),
+            taken,
+            np.array(shunned, dtype=np.float64),
         )
-        sight = Sight(self.limits.margin_px + _doubt_px(estimate, self.limits), self.limits.fewest)
-        for reasons in (self._bad_views, self._hidden, self._blocked, self._failed_before):
-            why = reasons(estimate, joints, sight, taken, np.array(shunned, dtype=np.float64))
-            turned_down.update(reason for reason in why if reason is not None)
-            joints = joints[[reason is None for reason in why]]
+        passed, turned_down = sieve.sift(joints)
+        joints = joints[passed]
+        turned_down["the arm does not reach the pose"] = unreached
         width = len(str(len(joints)))
         names = [f"{prefix}_{i:0{width}d}" for i in range(1, len(joints) + 1)]
-        poses = self.arm.forward(joints) if len(joints) else np.zeros((0, 4, 4))
-        pool = Pool(
-            tuple(
-                Candidate(name, Pose(pose), tuple(q.tolist()))
-                for name, pose, q in zip(names, poses, joints, strict=True)
-            )
-        )
         found = {name: count for name, count in turned_down.items() if count > 0}
-        return FeasiblePool(pool, dict(zip(names, joints, strict=True)), found, sight)
+        pool = candidates_at(self.arm, names, joints)
+        return FeasiblePool(pool, dict(zip(names, joints, strict=True)), found, sieve)
 
     def _on_shell(self, estimate: Estimate, taken: FloatArray, random: np.random.Generator) -> FloatArray:
         """Joints (M, n) of camera poses that look at the target from all around, rolled."""
@@ -166,80 +130,16 @@ class Generator:
         low, high = self.arm.limits.T
         return joints[np.all((joints >= low) & (joints <= high), axis=1)]
 
-    def _bad_views(
-        self, estimate: Estimate, joints: FloatArray, sight: Sight, taken: FloatArray, shunned: FloatArray
-    ) -> list[str | None]:
-        del sight, taken, shunned
-        poses = estimate.X.matrix @ self._motions(estimate, joints) @ estimate.Y.matrix
-        middle = poses[:, :3, :3] @ estimate.target.points.mean(axis=0) + poses[:, :3, 3]
-        distance = np.linalg.norm(middle, axis=1)
-        cosine = np.einsum("ki,ki->k", poses[:, :3, 2], middle) / np.maximum(distance, 1e-9)
-        near, far = self.limits.distance_m
-        answers: list[str | None] = []
-        for length, toward in zip(distance, cosine, strict=True):
-            if not near <= length <= far:
-                answers.append("too near to the target or too far from it")
-            elif toward < np.cos(self.limits.tilt_rad):
-                answers.append("the target would be seen too obliquely")
-            else:
-                answers.append(None)
-        return answers
 
-    def _hidden(
-        self, estimate: Estimate, joints: FloatArray, sight: Sight, taken: FloatArray, shunned: FloatArray
-    ) -> list[str | None]:
-        del taken, shunned
-        why = obstacles(estimate, self._motions(estimate, joints), sight)
-        return [None if reason is None else "the target would not be whole in the image" for reason in why]
-
-    def _blocked(
-        self, estimate: Estimate, joints: FloatArray, sight: Sight, taken: FloatArray, shunned: FloatArray
-    ) -> list[str | None]:
-        del sight, taken, shunned
-        return self.body(estimate).obstacles(joints)
-
-    def _failed_before(
-        self, estimate: Estimate, joints: FloatArray, sight: Sight, taken: FloatArray, shunned: FloatArray
-    ) -> list[str | None]:
-        del estimate, sight
-        if len(shunned) == 0:
-            return [None] * len(joints)
-        to_failed = _distances(joints, shunned)
-        radius = 0.5 * _distances(shunned, taken).min(axis=1)
-        return [
-            "near to where it failed before" if near else None for near in (to_failed < radius).any(axis=1)
-        ]
-
-    def _motions(self, estimate: Estimate, joints: FloatArray) -> FloatArray:
-        poses = self.arm.forward(joints).reshape(-1, 4, 4)
-        if estimate.mounting is Mounting.EYE_TO_HAND:
-            return poses
-        return np.asarray(np.linalg.inv(poses), dtype=np.float64)
-
-
-def mounted_points(estimate: Estimate) -> FloatArray:
-    """(P, 3) points in the flange of what is mounted there: the camera's centre, or the target's corners."""
-    if estimate.mounting is Mounting.EYE_IN_HAND:
-        return estimate.X.inverse().matrix[np.newaxis, :3, 3]
-    points = estimate.target.points
-    low, high = points.min(axis=0), points.max(axis=0)
-    corners = np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
-    return estimate.Y.act(corners)
-
-
-def _doubt_px(estimate: Estimate, limits: ViewLimits) -> float:
-    """Twice the deviation in px by which the estimate may misplace the target, up to a fifth of the image."""
-    covariance = estimate.covariance[:12, :12]
-    shift = np.sqrt(np.trace(covariance[:3, :3]) + np.trace(covariance[6:9, 6:9]))
-    turn = np.sqrt(np.trace(covariance[3:6, 3:6]))
-    focal = float(estimate.camera.parameters[:2].max())
-    deviation = focal * (shift / float(np.mean(limits.distance_m)) + turn)
-    return float(min(2 * deviation, 0.2 * min(estimate.camera.size_px)))
-
-
-def _distances(joints: FloatArray, others: FloatArray) -> FloatArray:
-    """(N, M) largest joint difference between postures (N, n) and (M, n)."""
-    return np.abs(joints[:, np.newaxis] - others[np.newaxis]).max(axis=2)
+def candidates_at(arm: Arm, names: Sequence[str], joints: FloatArray) -> Pool:
+    """Return candidates of these names at postures (N, n)."""
+    poses = arm.forward(joints) if len(joints) else np.zeros((0, 4, 4))
+    return Pool(
+        tuple(
+            Candidate(name, Pose(pose), tuple(q.tolist()))
+            for name, pose, q in zip(names, poses, joints, strict=True)
+        )
+    )
 
 
 def _turns(axis: int, angles: FloatArray) -> FloatArray:

@@ -123,6 +123,7 @@ class Planner:
         self._random = np.random.default_rng(self._options.seed)
         self._estimate = estimator(measurements)
         self._pending: Proposal | None = None
+        self._gains: FloatArray | None = None
 
     @property
     def estimate(self) -> Estimate:
@@ -141,14 +142,18 @@ class Planner:
 
     def gains(self) -> FloatArray:
         """(N,) gain of each candidate left; NaN where too little of the target would be in sight."""
-        if len(self._pool) == 0:
+        if self._gains is None:
+            self._gains = self._scored(self._pool)
+        return self._gains
+
+    def _scored(self, pool: Pool) -> FloatArray:
+        if len(pool) == 0:
             return np.zeros(0)
-        motions = self._pool.motions(self._measurements.mounting)
         return self._estimate.gains(
             self._options.criterion,
-            motions,
+            pool.motions(self._measurements.mounting),
             self._options.sight,
-            joints=self._pool.joints,
+            joints=pool.joints,
             over_posterior=self._is_young(),
         )
 
@@ -199,12 +204,28 @@ class Planner:
         realised = before.entropy - estimate.entropy if np.isfinite(before.entropy) else float("nan")
         self._measurements, self._estimate, self._pending = measurements, estimate, None
         self._pool = self._pool.without([view.name])
+        self._gains = None
         return Verdict(estimate, predicted, realised)
 
     def give_up(self, name: str) -> None:
         """Take a candidate out of the pool that could not be reached or did not show the target."""
+        kept = [candidate.name != name for candidate in self._pool.candidates]
+        self._gains = None if self._gains is None else self._gains[kept]
         self._pool = self._pool.without([name])
         self._pending = None
+
+    def offer(self, candidates: Sequence[Candidate]) -> None:
+        """Add candidates to those left.
+
+        Raises
+        ------
+        InputError
+            One has the name of another that is left.
+        """
+        pool = Pool((*self._pool.candidates, *candidates))
+        if self._gains is not None:
+            self._gains = np.concatenate([self._gains, self._scored(Pool(tuple(candidates)))])
+        self._pool, self._pending = pool, None
 
 
 def replay(planner: Planner, views: Sequence[View]) -> list[Proposal | Stop]:

@@ -11,8 +11,8 @@ from handeye.cameras.render import Appearance
 from handeye.cameras.simulated import Optics
 from handeye.errors import InputError
 from handeye.planning.collisions import Workspace
-from handeye.planning.feasibility import ViewLimits
 from handeye.planning.policies import make_policy
+from handeye.planning.sieve import ViewLimits
 from handeye.robots import Arm, open_arm
 from handeye.robots.protocol import Goal
 from handeye.robots.simulated import ArmErrors, SimulatedArm
@@ -73,6 +73,7 @@ class Configuration:
     speed_rad_s: float = 0.5
     failures_in_a_row: int = 10
     joints_err: bool = True
+    refine: bool = True
     workspace_m: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     floor_m: float = 0.0
     limits: ViewLimits = field(default_factory=ViewLimits)
@@ -95,6 +96,7 @@ class Configuration:
             self.failures_in_a_row,
             speed_rad_s=self.speed_rad_s,
             joints_err=self.joints_err,
+            refine=self.refine,
             policy=make_policy(self.policy),
         )
 

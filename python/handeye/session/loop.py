@@ -14,10 +14,12 @@ import numpy as np
 
 from handeye.detection import Detection
 from handeye.errors import HandeyeError, InputError, OutputError
-from handeye.planning import Planner, PlannerOptions, Stop, StopReason
-from handeye.planning.feasibility import FeasiblePool, Generator, ViewLimits
+from handeye.planning import Planner, PlannerOptions, Proposal, Stop, StopReason
+from handeye.planning.feasibility import Generator
 from handeye.planning.policies import Policy
 from handeye.planning.policies.next_best_view import NextBestView
+from handeye.planning.refinement import offered, refine
+from handeye.planning.sieve import ViewLimits
 from handeye.planning.stopping import NumberOfViews, StopRule
 from handeye.planning.travel import Travel
 from handeye.robots import ArmKinematics
@@ -29,9 +31,9 @@ from handeye.session.request import Reach, Requested, reach
 from handeye.session.starting import Start, starting_goal
 from handeye.session.store import SessionStore
 from handeye.solving import Estimate, Estimator, Measurements, calibrate_examined, make_estimator, view_pose
+from handeye.solving.estimate import Sight
 from handeye.solving.mistakes import examine
 from handeye.types import Pose, View
-from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName
 
 START_VIEWS = 3
@@ -74,6 +76,8 @@ class Wish:
         No joint moves faster.
     joints_err
         Weigh noise and offsets of the joints as causes of error: the description of the arm is known anyway.
+    refine
+        Climb from the best candidates to better ones near them, rather than take the best that was drawn.
 
     Raises
     ------
@@ -90,6 +94,7 @@ class Wish:
     tries_at_a_place: int = 3
     speed_rad_s: float = 0.5
     joints_err: bool = True
+    refine: bool = True
     policy: Policy = field(default_factory=NextBestView)
 
     def __post_init__(self) -> None:
@@ -288,22 +293,29 @@ class Session:
             travel=self._travel(),
         )
         planner = Planner(measurements, drawn.pool, _known(estimate), options)
-        body = self._generator.body(estimate)
         turned_down = dict(drawn.turned_down)
-        while True:
-            answer = planner.ask()
-            if isinstance(answer, Stop):
-                break
-            joints = drawn.joints[answer.candidate.name]
-            why = body.obstacle_on_path(self._standing(), joints)
+        joints_of = dict(drawn.joints)
+        answer = planner.ask()
+        climbed: dict[str, dict[str, Any]] = {}
+        if self._wish.refine and not isinstance(answer, Stop):
+            refined = refine(drawn, planner.gains(), options, random)
+            joints_of |= {one.name: one.joints for one in refined}
+            climbed = {one.name: {"from": one.seed, "seed_gain": one.seed_gain} for one in refined}
+            if refined:
+                planner.offer(offered(refined, self._cell.arm))
+                answer = planner.ask()
+        while not isinstance(answer, Stop):
+            name = answer.candidate.name
+            why = drawn.sieve.body.obstacle_on_path(self._standing(), joints_of[name])
             if why is None:
-                decision = _decision(
-                    answer.names, answer.gains, answer.predicted_gain, drawn, turned_down, estimate
-                )
-                goal = self._goal(answer.candidate.T_base_flange, tuple(joints.tolist()))
+                decision = _decision(answer, drawn.sight, turned_down, estimate)
+                if name in climbed:
+                    decision["refined"] = climbed[name]
+                goal = self._goal(answer.candidate.T_base_flange, tuple(joints_of[name].tolist()))
                 return Step(goal, "plan", decision, estimate)
             turned_down[f"on the way: {why}"] = turned_down.get(f"on the way: {why}", 0) + 1
-            planner.give_up(answer.candidate.name)
+            planner.give_up(name)
+            answer = planner.ask()
         if answer.reason is StopReason.NO_CANDIDATE:
             # An estimate too young to promise anything: widen it around the start.
             return self._starting(views, missed, estimate)
@@ -498,20 +510,17 @@ def _known(estimate: Estimate) -> Estimator:
 
 
 def _decision(
-    names: tuple[str, ...],
-    gains: FloatArray,
-    predicted: float,
-    drawn: FeasiblePool,
-    turned_down: dict[str, int],
-    estimate: Estimate,
+    answer: Proposal, sight: Sight, turned_down: dict[str, int], estimate: Estimate
 ) -> dict[str, Any]:
     now = reach(estimate)
     return {
-        "predicted_gain": predicted,
+        "predicted_gain": answer.predicted_gain,
         "candidates": {
-            name: round(float(gain), 6) for name, gain in zip(names, gains, strict=True) if np.isfinite(gain)
+            name: round(float(gain), 6)
+            for name, gain in zip(answer.names, answer.gains, strict=True)
+            if np.isfinite(gain)
         },
         "turned_down": turned_down,
-        "margin_px": drawn.sight.margin_px,
+        "margin_px": sight.margin_px,
         "reach_before": {"translation_mm": now.translation_mm, "rotation_deg": now.rotation_deg},
     }

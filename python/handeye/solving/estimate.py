@@ -176,8 +176,7 @@ class Estimate:
 
     def predictor(self, hypothesis: Hypothesis, sight: Sight) -> _core.Predictor:
         """Return what predicts candidate views from this estimate under one hypothesis."""
-        side = side_of_chain(self.mounting, hypothesis.robot_side)
-        root = isotropic_root(hypothesis.robot_translation_m, hypothesis.robot_rotation_rad)
+        side, root = self._robot_error(hypothesis)
         width, height = self.camera.size_px
         return _core.Predictor(
             self.camera.lens,
@@ -188,7 +187,7 @@ class Estimate:
             self.Y.matrix,
             pixel_sigma=self.candidate_sigma_px,
             robot_side=side,
-            robot_root=None if side is None else root,
+            robot_root=root,
             free_camera=list(self.free_camera) or None,
             free_joints=list(self.free_joints) or None,
             joint_noise=list(hypothesis.joint_deviations) or None,
@@ -214,6 +213,13 @@ class Estimate:
         poses = [self.mounting.chain(Pose(motion)) for motion in motions]
         views = zip(measurements.views, poses, strict=True)
         return replace(measurements, views=tuple(replace(view, T_base_flange=pose) for view, pose in views))
+
+    def _robot_error(self, hypothesis: Hypothesis) -> tuple[str | None, FloatArray | None]:
+        """Side of the chain and root (6, 6) of the covariance of the robot's error; None if it has none."""
+        side = side_of_chain(self.mounting, hypothesis.robot_side)
+        if side is None:
+            return None, None
+        return side, isotropic_root(hypothesis.robot_translation_m, hypothesis.robot_rotation_rad)
 
     def jacobians(self, joints: FloatArray | None) -> FloatArray | None:
         """(N, 6, n) how joints at positions (N, n) move A; None where arm or positions are not known."""
@@ -268,9 +274,12 @@ class Estimate:
     def _gains_at(
         self, criterion: _core.Criterion, motions: FloatArray, sight: Sight, jacobians: FloatArray | None
     ) -> FloatArray:
+        believed = [(p, _core.Belief(hypothesis.information), hypothesis) for p, hypothesis in self.averaged]
+        if jacobians is None:
+            supposed = [(p, belief, *self._robot_error(hypothesis)) for p, belief, hypothesis in believed]
+            return self.predictor(self.averaged[0][1], sight).mean_gains(supposed, criterion, motions)
         total = np.zeros(len(motions))
-        for probability, hypothesis in self.averaged:
-            belief = _core.Belief(hypothesis.information)
+        for probability, belief, hypothesis in believed:
             predictor = self.predictor(hypothesis, sight)
             total += probability * predictor.gains(belief, criterion, motions, jacobians=jacobians)
         return total

@@ -12,6 +12,8 @@ mod joints;
 mod links;
 mod posterior;
 mod smooth;
+mod weigh;
+mod weigh_links;
 
 pub use chain::{ChainStart, WeakPrior, start_from_poses};
 pub use compressed::{CompressedView, compress, shrunk_variances};

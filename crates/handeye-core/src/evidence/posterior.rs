@@ -5,7 +5,7 @@
 //! Integrating `theta` out (flat but for the priors) leaves the restricted likelihood of the levels,
 //! `-2 ln p = sum ln |Sigma_k| + e' Sigma^-1 e - theta' r + ln |Lambda|` (Patterson and Thompson 1971).
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, Vector6};
 
 use super::chain::WeakPrior;
 use super::compressed::CompressedView;
@@ -13,9 +13,11 @@ use super::hypotheses::{Hypothesis, Nature};
 use super::joints::JointErrors;
 use super::links::LinkErrors;
 use super::smooth::SmoothError;
+use super::weigh::{Equations, Sums, View};
+use super::weigh_links::LinkSums;
 use crate::error::Error;
-use crate::least_squares::Side;
 use crate::se3::Se3;
+use crate::simd::VectorUnit;
 
 /// How to estimate.
 #[derive(Clone, Debug)]
@@ -32,6 +34,12 @@ pub struct EvidenceOptions {
     pub links: Option<LinkErrors>,
     /// Most re-linearisations.
     pub linearisations: usize,
+}
+
+impl EvidenceOptions {
+    fn offset_count(&self) -> usize {
+        self.joints.as_ref().map_or(0, JointErrors::offset_count)
+    }
 }
 
 /// What is believed after the views, under all hypotheses together.
@@ -71,26 +79,6 @@ struct Linear {
     theta: DVector<f64>,
     /// By how much the joints are most likely displaced, where that is the hypothesis.
     link_twists: Option<DVector<f64>>,
-    minus_two_log_likelihood: f64,
-}
-
-/// Views linearised at `X` and `Y`, whitening left open.
-struct View {
-    /// `[I, Ad(X A), camera, joint offsets, e]`.
-    rows: DMatrix<f64>,
-    pixel_covariance: Matrix6<f64>,
-    left: Matrix6<f64>,
-    right: Matrix6<f64>,
-    /// Covariance in the camera frame of joints that are noisy by one radian.
-    joints: Option<Matrix6<f64>>,
-}
-
-/// The whitened views summed up under one noise, whatever the offsets.
-struct Sums {
-    products: DMatrix<f64>,
-    log_determinant: f64,
-    /// What was integrated out: the factor of its information, and its products with the other columns.
-    shared: Option<(Cholesky<f64, Dyn>, DMatrix<f64>)>,
 }
 
 /// Estimates `X`, `Y` and the camera from compressed views with pixel variances, averaged over the hypotheses.
@@ -105,7 +93,7 @@ pub fn estimate(
     options: &EvidenceOptions,
 ) -> Result<Posterior, Error> {
     let n_c = options.camera_prior.nrows();
-    let n_q = options.joints.as_ref().map_or(0, JointErrors::offset_count);
+    let n_q = options.offset_count();
     if views.len() != variances_px2.len() || views.is_empty() {
         return Err(Error::invalid("views and pixel variances must be as many, at least one"));
     }
@@ -151,20 +139,7 @@ pub fn estimate(
         }
         let prepared = prepare(views, variances_px2, &x, &y, options.joints.as_ref());
         let camera = camera_terms(views, variances_px2, &options.camera_prior);
-        // Hypotheses that differ only in the offsets stand side by side and share the sums over views.
-        let mut sums: Option<(usize, Option<Sums>)> = None;
-        let evaluated: Vec<(usize, Linear, f64)> = chosen
-            .iter()
-            .filter_map(|i| {
-                if !sums.as_ref().is_some_and(|(j, _)| hypotheses[*j].same_noise(&hypotheses[*i])) {
-                    sums = Some((*i, sum_up(&prepared, &hypotheses[*i], options)));
-                }
-                let sums = sums.as_ref()?.1.as_ref()?;
-                let linear = linearise(sums, &hypotheses[*i], &x, options, &camera)?;
-                let log = hypotheses[*i].log_prior - 0.5 * linear.minus_two_log_likelihood;
-                log.is_finite().then_some((*i, linear, log))
-            })
-            .collect();
+        let evaluated = weigh(&prepared, hypotheses, &chosen, &x, options, &camera);
         let best = evaluated.iter().map(|e| e.2).fold(f64::NEG_INFINITY, f64::max);
         if evaluated.is_empty() || !best.is_finite() {
             return Err(Error::numerical("no noise level explains these views"));
@@ -201,23 +176,25 @@ pub fn estimate(
     })
 }
 
-/// The answer: averaged over all hypotheses but those of errors that are smooth for reasons unknown.
+/// Weights in the answer: all hypotheses count but those of errors that are smooth for reasons unknown.
 ///
 /// What of a smooth error all views share cannot be told from `X` and `Y`, and the robot errs so again when it goes
 /// where the views were: taking it up predicts better than leaving it out (held-out views of real arms). How far the
 /// truth may be from such an answer is in the covariance, which counts all hypotheses. Where it is known how the
 /// links move the arm, their errors come out as such and can be put right in every pose.
-fn average(evaluated: &[(usize, Linear, f64)], hypotheses: &[Hypothesis], n: usize) -> DVector<f64> {
+fn answering<'a>(
+    evaluated: &'a [(usize, Linear, f64)],
+    hypotheses: &'a [Hypothesis],
+) -> impl Iterator<Item = (&'a Linear, f64)> {
     let chosen = || evaluated.iter().filter(|e| hypotheses[e.0].nature != Nature::Smooth);
     let best = chosen().map(|e| e.2).fold(f64::NEG_INFINITY, f64::max);
-    let mut mean = DVector::zeros(n);
-    let mut total = 0.0;
-    for (_, linear, log) in chosen() {
-        let weight = (log - best).exp();
-        mean += &linear.theta * weight;
-        total += weight;
-    }
-    mean / total
+    let total: f64 = chosen().map(|e| (e.2 - best).exp()).sum();
+    chosen().map(move |(_, linear, log)| (linear, (log - best).exp() / total))
+}
+
+fn average(evaluated: &[(usize, Linear, f64)], hypotheses: &[Hypothesis], n: usize) -> DVector<f64> {
+    answering(evaluated, hypotheses)
+        .fold(DVector::zeros(n), |mean, (linear, weight)| mean + &linear.theta * weight)
 }
 
 /// By how much the joints are displaced: averaged as the answer is, nothing where the links are exact.
@@ -226,16 +203,11 @@ fn expected_links(
     hypotheses: &[Hypothesis],
     links: Option<&LinkErrors>,
 ) -> DVector<f64> {
-    let mut mean = DVector::zeros(links.map_or(0, LinkErrors::coefficients));
-    let chosen = || evaluated.iter().filter(|e| hypotheses[e.0].nature != Nature::Smooth);
-    let best = chosen().map(|e| e.2).fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = chosen().map(|e| (e.2 - best).exp()).sum();
-    for (_, linear, log) in chosen() {
-        if let Some(twists) = &linear.link_twists {
-            mean += twists * ((log - best).exp() / total);
-        }
-    }
-    mean
+    let none = DVector::zeros(links.map_or(0, LinkErrors::coefficients));
+    answering(evaluated, hypotheses).fold(none, |mean, (linear, weight)| match &linear.link_twists {
+        Some(twists) => mean + twists * weight,
+        None => mean,
+    })
 }
 
 fn finish(
@@ -313,13 +285,8 @@ fn prepare(
             if let Some(joints) = joints {
                 rows.view_mut((0, 12 + n_c), (6, n_q)).copy_from(&(left * joints.offset_columns(k)));
             }
-            View {
-                rows,
-                pixel_covariance: view.covariance * *variance,
-                left,
-                right: to_y,
-                joints: joints.map(|j| left * j.unit_covariance(k) * left.transpose()),
-            }
+            let noisy_joints = joints.map(|j| left * j.unit_covariance(k) * left.transpose());
+            View::new(rows, &(view.covariance * *variance), &[left, to_y], noisy_joints.as_ref())
         })
         .collect()
 }
@@ -339,127 +306,93 @@ fn camera_terms(
     (information, gradient)
 }
 
-/// Root of the covariance of the robot's error of a hypothesis in the camera frame.
-fn robot_root(view: &View, hypothesis: &Hypothesis) -> Option<Matrix6<f64>> {
-    let map = match hypothesis.side? {
-        Side::Left => &view.left,
-        Side::Right => &view.right,
-    };
-    let mut root = *map;
-    for column in 0..6 {
-        let sigma = if column < 3 { hypothesis.translation_m } else { hypothesis.rotation_rad };
-        root.column_mut(column).scale_mut(sigma);
-    }
-    Some(root)
-}
-
-fn sum_up(views: &[View], hypothesis: &Hypothesis, options: &EvidenceOptions) -> Option<Sums> {
-    let n = views.first()?.rows.ncols() - 1;
-    let smooth = options.smooth.as_ref().filter(|_| hypothesis.nature == Nature::Smooth);
-    let links = options.links.as_ref().filter(|_| hypothesis.nature == Nature::Links);
-    let n_s = smooth.map_or(0, SmoothError::coefficients) + links.map_or(0, LinkErrors::coefficients);
-    let levels = (hypothesis.translation_m, hypothesis.rotation_rad);
-    let mut sums = DMatrix::zeros(n_s + n + 1, n_s + n + 1);
-    let mut log_determinant = 0.0;
-    // Coefficients of what views share come first: eliminating them is then the start of a factorisation.
-    let mut whitened = DMatrix::zeros(6, n_s + n + 1);
-    for (k, view) in views.iter().enumerate() {
-        let mut covariance = view.pixel_covariance;
-        if hypothesis.joint_rad > 0.0 {
-            covariance += view.joints? * hypothesis.joint_rad.powi(2);
-        } else if let Some(links) = links {
-            covariance += links.fill(k, &view.left, levels, &mut whitened);
-        } else if let Some(root) = robot_root(view, hypothesis) {
-            covariance += root * root.transpose() * smooth.map_or(1.0, |s| s.own(k));
-            if let Some(smooth) = smooth {
-                smooth.fill(k, &root, &mut whitened, 0);
-            }
-        }
-        let factor = covariance.cholesky()?;
-        let lower = factor.l_dirty();
-        log_determinant += 2.0 * (0..6).map(|i| lower[(i, i)].ln()).sum::<f64>();
-        whitened.columns_mut(n_s, n + 1).copy_from(&view.rows);
-        for column in 0..=n_s + n {
-            for i in 0..6 {
-                let mut value = whitened[(i, column)];
-                for j in 0..i {
-                    value -= lower[(i, j)] * whitened[(j, column)];
-                }
-                whitened[(i, column)] = value / lower[(i, i)];
-            }
-        }
-        sums.gemm_tr(1.0, &whitened, &whitened, 1.0);
-    }
-    if n_s == 0 {
-        return Some(Sums { products: sums, log_determinant, shared: None });
-    }
-    // Integrate the coefficients out, each of variance one beforehand.
-    let own = sums.view((0, 0), (n_s, n_s)) + DMatrix::identity(n_s, n_s);
-    let factor = own.cholesky()?;
-    log_determinant += 2.0 * (0..n_s).map(|i| factor.l_dirty()[(i, i)].ln()).sum::<f64>();
-    let across = sums.view((0, n_s), (n_s, n + 1)).into_owned();
-    let explained = factor.l().solve_lower_triangular(&across)?;
-    let mut products = sums.view((n_s, n_s), (n + 1, n + 1)).into_owned();
-    products.gemm_tr(-1.0, &explained, &explained, 1.0);
-    Some(Sums { products, log_determinant, shared: Some((factor, across)) })
-}
-
-fn linearise(
-    sums: &Sums,
-    hypothesis: &Hypothesis,
+/// Each of the chosen hypotheses that has a likelihood, with the logarithm of its probability.
+fn weigh(
+    views: &[View],
+    hypotheses: &[Hypothesis],
+    chosen: &[usize],
     x: &Se3,
     options: &EvidenceOptions,
     camera: &(DMatrix<f64>, DVector<f64>),
-) -> Option<Linear> {
-    let n_c = camera.1.len();
-    let n = sums.products.ncols() - 1;
-    let mut information = sums.products.view((0, 0), (n, n)).into_owned();
-    let mut right = -sums.products.view((0, n), (n, 1)).into_owned().column(0).into_owned();
-    let (weak, pull) = options.prior.normal(x);
-    let mut block = information.view_mut((0, 0), (12, 12));
-    block += &weak;
-    let mut rows = right.rows_mut(0, 12);
-    rows += &pull;
-    let mut block = information.view_mut((12, 12), (n_c, n_c));
-    block += &camera.0;
-    let mut rows = right.rows_mut(12, n_c);
-    rows += &camera.1;
-    let log_prior_determinant = options.joints.as_ref().map_or(0.0, |joints| {
-        let mut sum = 0.0;
-        for (i, joint) in joints.free.iter().enumerate() {
-            let sigma = hypothesis.offset_rad * joints.scales[*joint];
-            information[(12 + n_c + i, 12 + n_c + i)] += sigma.powi(-2);
-            // The prior's normalisation depends on the level.
-            sum += 2.0 * sigma.ln();
-        }
-        sum
-    });
-    let (theta, information_log_determinant) = solve_scaled(&information, &right)?;
-    let minus_two_log_likelihood =
-        sums.log_determinant + sums.products[(n, n)] - theta.dot(&right) + information_log_determinant;
-    let minus_two_log_likelihood = minus_two_log_likelihood + log_prior_determinant;
-    let link_twists =
-        sums.shared.as_ref().filter(|_| hypothesis.nature == Nature::Links).and_then(|shared| {
-            let links = options.links.as_ref()?;
-            let mut twists = -shared.0.solve(&(shared.1.columns(0, n) * &theta + shared.1.column(n)));
-            for (i, twist) in twists.iter_mut().enumerate() {
-                *twist *= links.deviation(i, hypothesis.translation_m, hypothesis.rotation_rad);
+) -> Vec<(usize, Linear, f64)> {
+    let unit = VectorUnit::widest();
+    let mut equations = Equations::new(12 + camera.1.len() + options.offset_count(), chosen.len());
+    let mut constants = vec![f64::NAN; chosen.len()];
+    for nature in [Nature::White, Nature::Smooth] {
+        // Hypotheses that differ only in the offsets stand side by side and share the sums over views.
+        let mut noises: Vec<&Hypothesis> = Vec::new();
+        let mut places = Vec::new();
+        for (place, i) in chosen.iter().enumerate().filter(|(_, i)| hypotheses[**i].nature == nature) {
+            let hypothesis = &hypotheses[*i];
+            if !noises.last().is_some_and(|last| last.same_noise(hypothesis)) {
+                noises.push(hypothesis);
             }
-            Some(twists)
-        });
-    Some(Linear { information, theta, link_twists, minus_two_log_likelihood })
+            places.push((place, noises.len() - 1));
+        }
+        if !noises.is_empty() {
+            let smooth = options.smooth.as_ref().filter(|_| nature == Nature::Smooth);
+            let sums = Sums::new(views, &noises, smooth, unit);
+            sums.fill(&places, &mut equations, &mut constants);
+        }
+    }
+    let displaced = |i: usize| options.links.as_ref().filter(|_| hypotheses[i].nature == Nature::Links);
+    let links: Vec<Option<LinkSums>> = chosen
+        .iter()
+        .enumerate()
+        .map(|(place, i)| {
+            let sums = LinkSums::new(views, &hypotheses[*i], displaced(*i)?)?;
+            sums.fill(place, &mut equations, &mut constants);
+            Some(sums)
+        })
+        .collect();
+    add_beliefs(hypotheses, chosen, x, options, camera, (&mut equations, &mut constants));
+    equations.solve(unit);
+    let weighed = chosen.iter().enumerate().map(|(place, i)| {
+        let log = hypotheses[*i].log_prior - 0.5 * (constants[place] + equations.value(place));
+        (place, *i, log)
+    });
+    weighed
+        .filter(|(_, _, log)| log.is_finite())
+        .map(|(place, i, log)| {
+            let theta = DVector::from_iterator(equations.size(), equations.theta(place));
+            let link_twists = links[place].as_ref().map(|sums| sums.displacements(&theta));
+            (i, Linear { information: equations.information(place), theta, link_twists }, log)
+        })
+        .collect()
 }
 
-/// Solution and log-determinant of a positive definite system whose units differ by orders of magnitude.
-fn solve_scaled(m: &DMatrix<f64>, right: &DVector<f64>) -> Option<(DVector<f64>, f64)> {
-    let n = m.nrows();
-    let scale: Vec<f64> = (0..n).map(|i| m[(i, i)].sqrt().recip()).collect();
-    let factor = DMatrix::from_fn(n, n, |i, j| m[(i, j)] * scale[i] * scale[j]).cholesky()?;
-    let mut theta = DVector::from_fn(n, |i, _| right[i] * scale[i]);
-    factor.solve_mut(&mut theta);
-    for i in 0..n {
-        theta[i] *= scale[i];
+/// Adds what is believed of the chain, the camera and the offsets of the joints besides the poses.
+fn add_beliefs(
+    hypotheses: &[Hypothesis],
+    chosen: &[usize],
+    x: &Se3,
+    options: &EvidenceOptions,
+    camera: &(DMatrix<f64>, DVector<f64>),
+    (equations, constants): (&mut Equations, &mut [f64]),
+) {
+    let (weak, pull) = options.prior.normal(x);
+    let (n_c, count) = (camera.1.len(), chosen.len());
+    for i in 0..12 {
+        for j in i..12 {
+            equations.information_row(i, j)[..count].iter_mut().for_each(|entry| *entry += weak[(i, j)]);
+        }
+        equations.right_row(i)[..count].iter_mut().for_each(|entry| *entry += pull[i]);
     }
-    let log = (0..n).map(|i| factor.l_dirty()[(i, i)].ln() - scale[i].ln()).sum::<f64>() * 2.0;
-    Some((theta, log))
+    for i in 0..n_c {
+        for j in i..n_c {
+            let row = equations.information_row(12 + i, 12 + j);
+            row[..count].iter_mut().for_each(|entry| *entry += camera.0[(i, j)]);
+        }
+        equations.right_row(12 + i)[..count].iter_mut().for_each(|entry| *entry += camera.1[i]);
+    }
+    let Some(joints) = &options.joints else { return };
+    for (i, joint) in joints.free.iter().enumerate() {
+        let row = equations.information_row(12 + n_c + i, 12 + n_c + i);
+        for ((entry, constant), hypothesis) in row.iter_mut().zip(constants.iter_mut()).zip(chosen) {
+            let sigma = hypotheses[*hypothesis].offset_rad * joints.scales[*joint];
+            *entry += sigma.powi(-2);
+            // The prior's normalisation depends on the level.
+            *constant += 2.0 * sigma.ln();
+        }
+    }
 }

@@ -5,7 +5,7 @@
 //! functions of the posture whose coefficients are twists of their own (Rasmussen and Williams, "Gaussian Processes
 //! for Machine Learning", 2006, section 2.2). The coefficients are integrated out like any other parameter.
 
-use nalgebra::{DMatrix, Matrix6, SymmetricEigen};
+use nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::error::Error;
 
@@ -17,7 +17,7 @@ const SMALLEST_FUNCTION: f64 = 0.01;
 /// The functions of which a smooth error is made, at the postures of the views.
 #[derive(Clone, Debug)]
 pub struct SmoothError {
-    /// Value of each function (columns) at each view (rows).
+    /// Value of each function (rows) at each view (columns).
     functions: DMatrix<f64>,
     /// Share of the variance that is each view's own.
     own: Vec<f64>,
@@ -42,10 +42,10 @@ impl SmoothError {
             return Err(Error::invalid("a correlation has no negative eigenvalues"));
         }
         let kept: Vec<usize> = (0..n).filter(|i| eigen.eigenvalues[*i] > SMALLEST_FUNCTION).collect();
-        let functions = DMatrix::from_fn(n, kept.len(), |k, j| {
+        let functions = DMatrix::from_fn(kept.len(), n, |j, k| {
             eigen.eigenvectors[(k, kept[j])] * (eigen.eigenvalues[kept[j]] * (1.0 - OWN_SHARE)).sqrt()
         });
-        let own = (0..n).map(|k| (1.0 - functions.row(k).norm_squared()).max(OWN_SHARE)).collect();
+        let own = (0..n).map(|k| (1.0 - functions.column(k).norm_squared()).max(OWN_SHARE)).collect();
         Ok(Self { functions, own })
     }
 
@@ -67,13 +67,12 @@ impl SmoothError {
 
     /// Number of coefficients: a twist for each function.
     pub(super) fn coefficients(&self) -> usize {
-        6 * self.functions.ncols()
+        6 * self.functions.nrows()
     }
 
-    /// Writes what a unit of each coefficient does to view `k` into 6 rows, where a unit twist does `root`.
-    pub(super) fn fill(&self, k: usize, root: &Matrix6<f64>, rows: &mut DMatrix<f64>, first: usize) {
-        for j in 0..self.functions.ncols() {
-            rows.fixed_view_mut::<6, 6>(0, first + 6 * j).copy_from(&(root * self.functions[(k, j)]));
-        }
+    /// Values of the functions at view `k`.
+    pub(super) fn functions(&self, k: usize) -> &[f64] {
+        let count = self.functions.nrows();
+        &self.functions.as_slice()[k * count..(k + 1) * count]
     }
 }

@@ -45,6 +45,17 @@ pub struct CandidateModel<'a> {
     pub sight: Sight,
 }
 
+/// What may be so of the robot's error, and what is believed then.
+#[derive(Clone, Debug)]
+pub struct Supposition<'a> {
+    /// Its share in a mean.
+    pub weight: f64,
+    /// What is believed.
+    pub belief: &'a Belief,
+    /// As [`CandidateModel::robot`].
+    pub robot: Option<(Side, Matrix6<f64>)>,
+}
+
 /// A candidate's information `F F'` in all global parameters.
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -210,17 +221,40 @@ impl CandidateModel<'_> {
         motions: Motions<'_>,
         execution: &Execution,
     ) -> Result<Vec<f64>, Error> {
-        self.check(belief)?;
-        let mut gains = vec![f64::NAN; motions.len()];
-        let prepared = criterion.prepare(belief)?;
+        let supposed = Supposition { weight: 1.0, belief, robot: self.robot };
+        self.mean_gains(&[supposed], criterion, motions, execution)
+    }
+
+    /// As [`CandidateModel::gains_by`], averaged over what may be supposed of the robot in place of the model's; the
+    /// points of a candidate are looked at once.
+    ///
+    /// # Errors
+    /// As [`CandidateModel::gains_by`].
+    pub fn mean_gains(
+        &self,
+        supposed: &[Supposition<'_>],
+        criterion: &dyn Criterion,
+        motions: Motions<'_>,
+        execution: &Execution,
+    ) -> Result<Vec<f64>, Error> {
+        let mut gains = vec![0.0; motions.len()];
         if let Some(quantity) = criterion.quantity() {
-            Scorer::new(self, belief, &quantity, prepared, execution.unit)?
-                .score(motions, execution, &mut gains)?;
+            let mut scorer = Scorer::new(self, execution.unit);
+            for one in supposed {
+                self.check(one.belief)?;
+                let prepared = criterion.prepare(one.belief)?;
+                scorer.add_goal(one.weight, one.belief, one.robot.as_ref(), &quantity, prepared)?;
+            }
+            scorer.score(motions, execution, &mut gains)?;
             return Ok(gains);
         }
-        for (i, gain) in gains.iter_mut().enumerate() {
-            if let Some(candidate) = self.candidate(&motions.get(i)?, None) {
-                *gain = prepared.gain(&candidate.factor);
+        for one in supposed {
+            self.check(one.belief)?;
+            let model = Self { robot: one.robot, ..self.clone() };
+            let prepared = criterion.prepare(one.belief)?;
+            for (i, gain) in gains.iter_mut().enumerate() {
+                let candidate = model.candidate(&motions.get(i)?, None);
+                *gain += one.weight * candidate.map_or(f64::NAN, |c| prepared.gain(&c.factor));
             }
         }
         Ok(gains)
@@ -361,7 +395,7 @@ impl Model {
 
 /// `F` with `F F' = m` for a positive semi-definite `m`: Cholesky with diagonal pivoting, which leaves the columns of
 /// null directions zero (Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., 2002, section 10.3).
-fn semidefinite_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn semidefinite_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
     let n = m.nrows();
     let scale: Vec<f64> = (0..n).map(|i| m[(i, i)].abs()).collect();
     let mut left: Vec<usize> = (0..n).collect();

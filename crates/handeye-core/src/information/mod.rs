@@ -9,4 +9,5 @@ pub mod criteria;
 mod scorer;
 
 pub use belief::{Belief, entropy};
-pub use candidate::{Candidate, CandidateJoints, CandidateModel, Execution, Motions, Sight};
+pub(crate) use candidate::semidefinite_root;
+pub use candidate::{Candidate, CandidateJoints, CandidateModel, Execution, Motions, Sight, Supposition};

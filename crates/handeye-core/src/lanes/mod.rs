@@ -4,6 +4,7 @@
 
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 
+mod factor;
 mod lens;
 mod moments;
 mod symmetric;
@@ -11,6 +12,7 @@ mod transform;
 
 use crate::simd::{Simd, Vector};
 
+pub(crate) use factor::{factorise, log_pivots};
 pub(crate) use lens::{Bent, Window, bend};
 pub(crate) use moments::Sums;
 pub(crate) use symmetric::{UPPER, upper};

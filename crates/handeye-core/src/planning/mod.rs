@@ -2,6 +2,8 @@
 
 mod certificate;
 mod objective;
+mod pool;
+mod reweigh;
 mod selection;
 
 pub use certificate::{Certificate, certify};

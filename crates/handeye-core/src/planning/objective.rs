@@ -49,25 +49,45 @@ impl Objective {
         }
     }
 
-    /// `phi` and its gradient, a positive semi-definite matrix `G` with `d phi = tr(G d Lambda)`.
-    pub(super) fn gradient(&self, information: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
+    /// `phi` and its derivatives; `None` if the information is not positive definite.
+    pub(super) fn expand(&self, information: &DMatrix<f64>) -> Option<Expansion> {
         let n = information.nrows();
         let (covariance, whole) = inverse_and_log_determinant(information)?;
         match self {
-            Self::Entropy => Some((whole, covariance)),
+            Self::Entropy => {
+                Some(Expansion { value: whole, gradient: covariance.clone(), covariance, of_rest: None })
+            }
             Self::EntropyHandEye => {
-                let (inverse_of_rest, of_rest) = inverse_and_log_determinant(&nuisance(information))?;
-                let mut gradient = covariance;
+                let (of_rest, rest) = inverse_and_log_determinant(&nuisance(information))?;
+                let mut gradient = covariance.clone();
                 let mut block = gradient.view_mut((6, 6), (n - 6, n - 6));
-                block -= inverse_of_rest;
-                Some((whole - of_rest, gradient))
+                block -= &of_rest;
+                Some(Expansion { value: whole - rest, gradient, covariance, of_rest: Some(of_rest) })
             }
             Self::ToolPoint(q) => {
                 let columns = covariance.columns(0, 6).into_owned();
                 let value = -(q * covariance.view((0, 0), (6, 6))).trace();
-                Some((value, &columns * q * columns.transpose()))
+                let gradient = &columns * q * columns.transpose();
+                Some(Expansion { value, gradient, covariance, of_rest: None })
             }
         }
+    }
+
+    /// How fast the gradient falls along `direction`: `C` with `d tr(G E) = -tr(C E)` for any symmetric `E`, up to the
+    /// antisymmetric part of `C`.
+    pub(super) fn curvature(&self, at: &Expansion, direction: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = direction.nrows();
+        let spread = direction * &at.covariance;
+        if let Self::ToolPoint(_) = self {
+            return &at.gradient * spread * 2.0;
+        }
+        let mut curvature = &at.covariance * spread;
+        if let Some(of_rest) = &at.of_rest {
+            let along = direction.view((6, 6), (n - 6, n - 6));
+            let mut block = curvature.view_mut((6, 6), (n - 6, n - 6));
+            block -= of_rest * along * of_rest;
+        }
+        curvature
     }
 
     /// How good `chosen` is against `best`, both values of `phi`, as a share of the best: the D-efficiency for
@@ -79,6 +99,16 @@ impl Objective {
             Self::ToolPoint(_) => (best / chosen).max(0.0).sqrt(),
         }
     }
+}
+
+/// `phi` at some information, and what its derivatives are made of.
+pub(super) struct Expansion {
+    pub value: f64,
+    /// Positive semi-definite `G` with `d phi = tr(G d Lambda)`.
+    pub gradient: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    /// Inverse of the information of everything but the hand-eye.
+    of_rest: Option<DMatrix<f64>>,
 }
 
 fn nuisance(information: &DMatrix<f64>) -> DMatrix<f64> {

@@ -1,9 +1,13 @@
 //! k views jointly: greedy, then exchange while a swap improves (Fedorov 1972; Mitchell 1974).
 
+use std::collections::BTreeSet;
+
 use nalgebra::DMatrix;
 
 use super::objective::Objective;
+use super::pool::Pool;
 use crate::error::Error;
+use crate::simd::VectorUnit;
 
 /// A choice of views and its worth.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,45 +50,63 @@ pub fn select(
     objective: &Objective,
 ) -> Result<Selection, Error> {
     check(base, pool, k)?;
-    let mut first: Vec<(usize, f64)> = (0..pool.len())
-        .map(|j| (j, objective.value(&(base + &pool[j])).unwrap_or(f64::NEG_INFINITY)))
-        .collect();
-    first.sort_by(|a, b| b.1.total_cmp(&a.1));
-    first
-        .iter()
-        .take(STARTS)
-        .filter_map(|(j, _)| from_first(base, pool, k, objective, *j))
-        .max_by(|a, b| a.value.total_cmp(&b.value))
-        .ok_or_else(|| Error::degenerate("no choice of these views determines the answer"))
+    let pool = Pool::new(pool, VectorUnit::widest());
+    let mut worth = Vec::new();
+    pool.worth(base, objective, &mut worth);
+    let mut first: Vec<usize> = (0..pool.len()).collect();
+    first.sort_by(|a, b| worth[*b].total_cmp(&worth[*a]));
+    let mut seen = BTreeSet::new();
+    let mut best: Option<Selection> = None;
+    for j in first.iter().take(STARTS) {
+        let found = from_first(base, &pool, k, objective, (*j, worth[*j]), &mut seen);
+        best = match (best, found) {
+            (Some(best), Some(found)) if is_better(found.value, best.value) => Some(found),
+            (best, found) => best.or(found),
+        };
+    }
+    best.ok_or_else(|| Error::degenerate("no choice of these views determines the answer"))
 }
 
-/// Greedy from a given first view, then exchange.
+/// Better by more than rounding: the order of choices of one worth is that of the pool on every machine.
+fn is_better(new: f64, old: f64) -> bool {
+    new > old + 1e-12 * old.abs() || !old.is_finite()
+}
+
+/// Greedy from a given first view and its worth, then exchange; `None` if nothing regular is found, or nothing that
+/// another first view has not led to.
 fn from_first(
     base: &DMatrix<f64>,
-    pool: &[DMatrix<f64>],
+    pool: &Pool<'_>,
     k: usize,
     objective: &Objective,
-    first: usize,
+    (first, alone): (usize, f64),
+    seen: &mut BTreeSet<Vec<usize>>,
 ) -> Option<Selection> {
+    let mut worth = Vec::new();
     let mut indices = vec![first];
-    let mut total = base + &pool[first];
-    let mut greedy = vec![objective.value(&total).unwrap_or(f64::NEG_INFINITY)];
+    let mut total = base + pool.information(first);
+    let mut greedy = vec![alone];
     for _ in 1..k {
-        let (index, value) = best_addition(&total, pool, &indices, objective)?;
-        total += &pool[index];
+        let (index, value) = best_addition(&total, pool, &indices, objective, &mut worth)?;
+        total += pool.information(index);
         indices.push(index);
         greedy.push(value);
     }
     let mut value = greedy[k - 1];
     let mut swaps = 0;
     for _ in 0..PASSES {
+        let mut choice = indices.clone();
+        choice.sort_unstable();
+        if !seen.insert(choice) {
+            return None;
+        }
         let before = swaps;
         for slot in 0..k {
-            let without = &total - &pool[indices[slot]];
-            if let Some((index, better)) = best_addition(&without, pool, &indices, objective)
-                && (better > value + 1e-12 * value.abs() || !value.is_finite())
+            let without = &total - pool.information(indices[slot]);
+            if let Some((index, better)) = best_addition(&without, pool, &indices, objective, &mut worth)
+                && is_better(better, value)
             {
-                total = without + &pool[index];
+                total = without + pool.information(index);
                 indices[slot] = index;
                 value = better;
                 swaps += 1;
@@ -97,14 +119,19 @@ fn from_first(
     value.is_finite().then_some(Selection { indices, greedy, value, swaps })
 }
 
+/// The view worth most on top of a total among those not taken, and the worth; `worth` is a desk.
 fn best_addition(
     total: &DMatrix<f64>,
-    pool: &[DMatrix<f64>],
+    pool: &Pool<'_>,
     taken: &[usize],
     objective: &Objective,
+    worth: &mut Vec<f64>,
 ) -> Option<(usize, f64)> {
-    (0..pool.len())
-        .filter(|j| !taken.contains(j))
-        .filter_map(|j| objective.value(&(total + &pool[j])).map(|value| (j, value)))
+    pool.worth(total, objective, worth);
+    worth
+        .iter()
+        .copied()
+        .enumerate()
+        .filter(|(j, value)| !taken.contains(j) && *value > f64::NEG_INFINITY)
         .max_by(|a, b| a.1.total_cmp(&b.1))
 }

@@ -2,9 +2,11 @@
 
 use nalgebra::{DMatrix, Vector3};
 
+use super::pool::Pool;
 use super::*;
 use crate::information::{CandidateModel, Sight};
 use crate::least_squares::tests::Cell;
+use crate::simd::VectorUnit;
 
 /// Information of three views as a base and of a pool of others.
 fn pool(seed: u64, size: usize) -> (DMatrix<f64>, Vec<DMatrix<f64>>) {
@@ -97,13 +99,82 @@ fn five_of_twenty_seven() {
 fn gradients_are_slopes() {
     let (base, pool) = pool(7, 5);
     for objective in objectives() {
-        let (_, gradient) = objective.gradient(&base).unwrap();
+        let gradient = objective.expand(&base).unwrap().gradient;
         for information in &pool {
             let h = 1e-6;
             let ahead = objective.value(&(&base + information * h)).unwrap();
             let behind = objective.value(&(&base - information * h)).unwrap();
             let slope = (ahead - behind) / (2.0 * h);
             assert!((slope - gradient.dot(information)).abs() < 1e-4 * slope.abs(), "{objective:?}");
+        }
+    }
+}
+
+#[test]
+fn curvatures_are_slopes_of_slopes() {
+    let (base, pool) = pool(9, 4);
+    for objective in objectives() {
+        let here = objective.expand(&base).unwrap();
+        for along in &pool {
+            let h = 1e-6;
+            let ahead = objective.expand(&(&base + along * h)).unwrap().gradient;
+            let behind = objective.expand(&(&base - along * h)).unwrap().gradient;
+            let curvature = objective.curvature(&here, along);
+            for other in &pool {
+                let slope = (ahead.dot(other) - behind.dot(other)) / (2.0 * h);
+                assert!((slope + curvature.dot(other)).abs() < 1e-3 * slope.abs(), "{objective:?}");
+            }
+        }
+    }
+}
+
+/// On every vector unit, what a pool says of its views is what they say one by one.
+#[test]
+fn views_side_by_side_are_worth_what_each_is() {
+    let (base, informations) = pool(10, 13);
+    for unit in VectorUnit::ALL.into_iter().filter(|unit| unit.is_available()) {
+        let pool = Pool::new(&informations, unit);
+        let mut out = Vec::new();
+        for objective in objectives() {
+            pool.worth(&base, &objective, &mut out);
+            assert_eq!(out.len(), informations.len());
+            for (found, information) in out.iter().zip(&informations) {
+                let expected = objective.value(&(&base + information)).unwrap();
+                assert!((found - expected).abs() < 1e-10 * expected.abs(), "{}: {objective:?}", unit.name());
+            }
+            let gradient = objective.expand(&base).unwrap().gradient;
+            pool.lean(&gradient, &mut out);
+            for (found, information) in out.iter().zip(&informations) {
+                assert!((found / gradient.dot(information) - 1.0).abs() < 1e-10, "{}", unit.name());
+            }
+            pool.worth(&(&base * -1e6), &objective, &mut out);
+            assert!(out.iter().all(|value| *value == f64::NEG_INFINITY));
+        }
+    }
+}
+
+/// The best fractional choice is found: bound and value meet, from any start and with nothing known before.
+#[test]
+fn bounds_meet_the_best_fractional_choice() {
+    for seed in 20..28 {
+        let (base, pool) = pool(seed, 60);
+        let nothing = DMatrix::zeros(12, 12);
+        for objective in objectives() {
+            for (base, k) in [(&base, 1), (&base, 7), (&nothing, 8)] {
+                let scale = objective.value(&pool.iter().sum()).unwrap().abs();
+                let tolerance = 1e-7 * scale;
+                let known: Vec<usize> = (0..k).collect();
+                let [a, b] = [&known[..], &[]].map(|start| {
+                    let found = certify(base, &pool, k, &objective, start, 300, tolerance).unwrap();
+                    assert!(
+                        found.bound - found.relaxed <= tolerance,
+                        "seed {seed}: {objective:?}: {found:?}"
+                    );
+                    assert!(found.iterations < 100, "seed {seed}: {objective:?}: {found:?}");
+                    found
+                });
+                assert!((a.relaxed - b.relaxed).abs() <= tolerance);
+            }
         }
     }
 }

@@ -55,6 +55,11 @@ class Policy(ABC):
 
     name: ClassVar[str]
 
+    def worth(self, gains: FloatArray, seconds: FloatArray | None) -> FloatArray | None:
+        """(N,) what candidates are worth by their gains and times; None if that is not what decides."""
+        del gains, seconds
+        return None
+
     @abstractmethod
     def choose(self, situation: Situation) -> Choice:
         """Return the candidate to take; there is at least one feasible one."""

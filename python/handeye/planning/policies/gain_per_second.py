@@ -3,6 +3,7 @@
 import numpy as np
 
 from handeye.planning.policies.base import Choice, Policy, Situation
+from handeye.types.arrays import FloatArray
 
 
 class GainPerSecond(Policy):
@@ -13,9 +14,12 @@ class GainPerSecond(Policy):
 
     name = "gain_per_second"
 
+    def worth(self, gains: FloatArray, seconds: FloatArray | None) -> FloatArray:
+        """Return the gains per second."""
+        return gains if seconds is None else gains / seconds
+
     def choose(self, situation: Situation) -> Choice:
         """Return the candidate with the largest gain per second."""
-        gains = situation.gains
-        rates = gains if situation.seconds is None else gains / situation.seconds
+        rates = self.worth(situation.gains, situation.seconds)
         best = int(np.nanargmax(rates))
         return Choice(best, float(rates[best]))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from handeye.planning.policies.base import Choice, Policy, Situation
+from handeye.types.arrays import FloatArray
 
 
 class NextBestView(Policy):
@@ -12,6 +13,11 @@ class NextBestView(Policy):
     """
 
     name = "next_best_view"
+
+    def worth(self, gains: FloatArray, seconds: FloatArray | None) -> FloatArray:
+        """Return the gains."""
+        del seconds
+        return gains
 
     def choose(self, situation: Situation) -> Choice:
         """Return the candidate with the largest gain."""

@@ -1,7 +1,7 @@
 //! Determinants of six-dimensional measurements, lanes = candidates; everything unrolled.
 
 use super::block::{BLOCK, Block, Row};
-use super::forms::{Form, Moved};
+use super::forms::{Form, Moved, packed};
 use crate::lanes::{UPPER, load, upper};
 use crate::simd::{Kernel, Simd, Vector, ln};
 
@@ -18,9 +18,10 @@ macro_rules! each {
     };
 }
 
-/// `|I + scale M S|` of a block, for `M` the information in it, of the twist alone.
+/// `|I + scale M S|` of a block, for `M` the information in it on the twist, the first of `size` rows.
 pub(super) struct Determinant<'a> {
     pub scale: f64,
+    pub size: usize,
     pub form: &'a Form,
     pub block: &'a Block,
     pub out: &'a mut Row,
@@ -41,8 +42,11 @@ impl Kernel for Determinant<'_> {
                 add_square(&u, &mut s);
             }
             let mut m = [simd.splat(0.0); UPPER];
-            for (to, from) in m.iter_mut().zip(&self.block.information) {
-                *to = simd.load(&from[at..]);
+            for i in 0..6 {
+                let row = &self.block.information[packed(self.size, i, i)..];
+                for j in i..6 {
+                    m[upper(i, j)] = simd.load(&row[j - i][at..]);
+                }
             }
             determinant(simd, s, simd.splat(self.scale), m).store(&mut self.out[at..]);
         }

@@ -97,7 +97,8 @@ impl Entropies {
         let noise = RobotNoise::new(x, robot);
         let without = match (of, robot) {
             (EntropyOf::Everything, None) => None,
-            (EntropyOf::Everything, Some(_)) => Some(noise.form(size)),
+            // The robot's error moves the twist alone.
+            (EntropyOf::Everything, Some(_)) => Some(noise.form(6)),
             (EntropyOf::HandEye, _) => {
                 let (nuisance, _) = belief
                     .nuisance()

@@ -36,7 +36,7 @@ use super::criteria::{Gain, Quantity};
 use crate::camera::{Camera, Lens};
 use crate::error::Error;
 use crate::lanes::{UPPER, Window, entries, upper};
-use crate::least_squares::PixelParameters;
+use crate::least_squares::{PixelParameters, Side};
 use crate::se3::Se3;
 use crate::simd::{VectorUnit, dispatch};
 
@@ -45,7 +45,8 @@ pub(super) struct Scorer<'a> {
     model: &'a CandidateModel<'a>,
     x: [f64; 12],
     y: [f64; 12],
-    goal: Goal<'a>,
+    /// What gains are averaged over, with weights.
+    goals: Vec<(f64, Goal<'a>)>,
     /// Present where lanes can do the points.
     lanes: Option<(Window, Target)>,
     columns: Vec<Column>,
@@ -60,15 +61,31 @@ enum Goal<'a> {
 }
 
 impl<'a> Scorer<'a> {
-    pub fn new(
-        model: &'a CandidateModel<'a>,
+    /// Without a goal yet.
+    pub fn new(model: &'a CandidateModel<'a>, unit: VectorUnit) -> Self {
+        let target =
+            if model.camera.lens == Lens::KannalaBrandt { None } else { Target::new(model.features) };
+        Self {
+            model,
+            x: entries(&model.x),
+            y: entries(&model.y),
+            goals: Vec::new(),
+            lanes: target.map(|target| (window(model), target)),
+            columns: model.pixel_parameters.map_or_else(Vec::new, columns),
+            unit,
+        }
+    }
+
+    /// Adds what a belief makes of candidates, given the robot's error, with a weight.
+    pub fn add_goal(
+        &mut self,
+        weight: f64,
         belief: &'a Belief,
+        robot: Option<&(Side, Matrix6<f64>)>,
         quantity: &Quantity,
         gain: Box<dyn Gain + 'a>,
-        unit: VectorUnit,
-    ) -> Result<Self, Error> {
-        let columns = model.pixel_parameters.map_or_else(Vec::new, columns);
-        let (count, x, robot) = (columns.len(), &model.x, model.robot.as_ref());
+    ) -> Result<(), Error> {
+        let (count, x) = (self.columns.len(), &self.model.x);
         let goal = match quantity {
             Quantity::Entropy(of) => Goal::Entropy(Entropies::new(belief, *of, count, x, robot)?),
             Quantity::CovarianceTrace(weights) => {
@@ -83,17 +100,8 @@ impl<'a> Scorer<'a> {
                 gain,
             ),
         };
-        let target =
-            if model.camera.lens == Lens::KannalaBrandt { None } else { Target::new(model.features) };
-        Ok(Self {
-            model,
-            x: entries(&model.x),
-            y: entries(&model.y),
-            goal,
-            lanes: target.map(|target| (window(model), target)),
-            columns,
-            unit,
-        })
+        self.goals.push((weight, goal));
+        Ok(())
     }
 
     /// Gains of motions; NaN where too little would be in sight.
@@ -135,8 +143,13 @@ impl<'a> Scorer<'a> {
             };
             self.approach(matrices, &mut block)?;
             self.inform(&mut block, &mut sums);
-            self.weigh(&mut block, &mut out);
-            gains.copy_from_slice(&out[..gains.len()]);
+            gains.fill(0.0);
+            for (weight, goal) in &self.goals {
+                self.weigh(goal, &mut block, &mut out);
+                for (gain, one) in gains.iter_mut().zip(&out) {
+                    *gain += weight * one;
+                }
+            }
         }
         Ok(())
     }
@@ -174,6 +187,12 @@ impl<'a> Scorer<'a> {
                 dispatch(self.unit, $kernel::<$($flag),*> { parameters, window, target, block })
             };
         }
+        macro_rules! see_pinhole {
+            ($camera:literal) => {{
+                let (focal, columns) = ([parameters[0], parameters[1]], &self.columns);
+                dispatch(self.unit, Pinhole::<$camera> { focal, columns, window, target, block })
+            }};
+        }
         macro_rules! see_wide {
             ($($flag:literal),*) => {{
                 let columns = &self.columns;
@@ -181,8 +200,9 @@ impl<'a> Scorer<'a> {
             }};
         }
         match (self.model.camera.lens, self.columns.is_empty()) {
-            (Lens::Pinhole | Lens::KannalaBrandt, true) => {
-                dispatch(self.unit, Pinhole { window, target, block });
+            (Lens::Pinhole | Lens::KannalaBrandt, true) => see_pinhole!(false),
+            (Lens::Pinhole | Lens::KannalaBrandt, false) if self.columns.iter().all(Column::is_of_camera) => {
+                see_pinhole!(true);
             }
             (Lens::Pinhole | Lens::KannalaBrandt, false) => see_wide!(false, false, false),
             (Lens::BrownConrady4 | Lens::BrownConrady5, true) => see!(Distorted, false, false),
@@ -215,14 +235,14 @@ impl<'a> Scorer<'a> {
     }
 
     /// Information to gains.
-    fn weigh(&self, block: &mut Block, out: &mut Row) {
+    fn weigh(&self, goal: &Goal<'_>, block: &mut Block, out: &mut Row) {
         let mut scale = 1.0;
         if self.lanes.is_some() {
             // Lanes leave out what is common to all points.
             scale = (self.model.camera.parameters[0] / self.model.pixel_sigma).powi(2);
         }
         let fewest = self.model.sight.fewest.max(1) as f64;
-        match &self.goal {
+        match goal {
             Goal::Entropy(Entropies { with, without }) => {
                 let mut determinants = [1.0; BLOCK];
                 self.determinant(scale, with, block, &mut determinants);
@@ -253,7 +273,7 @@ impl<'a> Scorer<'a> {
 
     fn determinant(&self, scale: f64, form: &Form, block: &Block, out: &mut Row) {
         if form.size == 6 {
-            dispatch(self.unit, Determinant { scale, form, block, out });
+            dispatch(self.unit, Determinant { scale, size: self.size(), form, block, out });
         } else {
             self.take(scale, form, block, Outcome::Determinant(out));
         }

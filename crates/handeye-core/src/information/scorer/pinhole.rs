@@ -1,33 +1,67 @@
 //! The information of corners seen by a pinhole camera, lanes = candidates.
 
 use super::block::{BLOCK, Block};
+use super::forms::packed;
 use super::target::Target;
+use super::wide_points::Column;
 use crate::camera::MIN_DEPTH_M;
-use crate::lanes::{Sums, Window, load, store};
+use crate::lanes::{Sums, Window, load, store, upper};
 use crate::simd::{Kernel, Mask, Simd, Vector};
 
 /// Sums the information, divided by `f_x^2`, of the points in sight, and counts them.
-pub(super) struct Pinhole<'a> {
+///
+/// With `CAMERA` also that of `f_x`, `f_y`, `c_x` and `c_y` as far as they are among the columns, which needs but two
+/// more sums.
+pub(super) struct Pinhole<'a, const CAMERA: bool> {
+    /// Focal lengths.
+    pub focal: [f64; 2],
+    pub columns: &'a [Column],
     pub window: &'a Window,
     pub target: &'a Target,
     pub block: &'a mut Block,
 }
 
-impl Kernel for Pinhole<'_> {
+impl<const CAMERA: bool> Kernel for Pinhole<'_, CAMERA> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         for at in (0..BLOCK).step_by(S::LANES) {
             let pose = load(simd, &self.block.pose, at);
-            let (sums, seen) = if whole(simd, self.window, self.target, &pose) {
-                (sum::<S, false>(simd, self.window, self.target, &pose).0, simd.splat(self.target.count))
+            let (sums, cubes, seen) = if whole(simd, self.window, self.target, &pose) {
+                let (sums, cubes, _) = sum::<S, false, CAMERA>(simd, self.window, self.target, &pose);
+                (sums, cubes, simd.splat(self.target.count))
             } else {
-                sum::<S, true>(simd, self.window, self.target, &pose)
+                sum::<S, true, CAMERA>(simd, self.window, self.target, &pose)
             };
             let information = sums.information(simd, self.window.squared_aspect, seen);
-            store(&information, self.block.of_twist(), at);
             seen.store(&mut self.block.seen[at..]);
+            if !CAMERA {
+                store(&information, self.block.of_twist(), at);
+                continue;
+            }
+            let size = 6 + self.columns.len();
+            let rows = &mut self.block.information;
+            for i in 0..6 {
+                for j in i..6 {
+                    information[upper(i, j)].store(&mut rows[packed(size, i, j)][at..]);
+                }
+            }
+            let inverse_focal = simd.splat(1.0 / self.focal[0]);
+            for (k, column) in self.columns.iter().enumerate() {
+                let Column::Camera(parameter) = *column else { continue };
+                let aspect = self.focal[1] / self.focal[0];
+                let with_twist = sums.with_camera(simd, parameter, aspect, seen, cubes);
+                for (i, entry) in with_twist.into_iter().enumerate() {
+                    (entry * inverse_focal).store(&mut rows[packed(size, i, 6 + k)][at..]);
+                }
+                for (l, other) in self.columns.iter().enumerate().skip(k) {
+                    let Column::Camera(other) = *other else { continue };
+                    let (i, j) = (parameter.min(other), parameter.max(other));
+                    let entry = sums.of_camera(simd, i, j, seen) * inverse_focal * inverse_focal;
+                    entry.store(&mut rows[packed(size, 6 + k, 6 + l)][at..]);
+                }
+            }
         }
     }
 }
@@ -68,17 +102,18 @@ fn whole<S: Simd>(simd: S, window: &Window, target: &Target, pose: &[S::Vector; 
     inside.all()
 }
 
-/// The sums over the points in sight, and their number.
+/// The sums over the points in sight, those of `x^3` and `y^3` for a `CAMERA`, and the number of points.
 #[inline(always)]
-fn sum<S: Simd, const PARTLY: bool>(
+fn sum<S: Simd, const PARTLY: bool, const CAMERA: bool>(
     simd: S,
     window: &Window,
     target: &Target,
     pose: &[S::Vector; 12],
-) -> (Sums<S::Vector>, S::Vector) {
+) -> (Sums<S::Vector>, [S::Vector; 2], S::Vector) {
     let one = simd.splat(1.0);
     let squared_aspect = simd.splat(window.squared_aspect);
     let mut sums = Sums::new(simd);
+    let mut cubes = [simd.splat(0.0); 2];
     let mut seen = simd.splat(0.0);
     for line in &target.lines {
         let (line_y, line_z) = (simd.splat(line.y), simd.splat(line.z));
@@ -104,7 +139,10 @@ fn sum<S: Simd, const PARTLY: bool>(
                 y = y.keep(in_sight);
             }
             sums.add(squared_aspect, w, x, y);
+            if CAMERA {
+                cubes = [(x * x).mul_add(x, cubes[0]), (y * y).mul_add(y, cubes[1])];
+            }
         }
     }
-    (sums, seen)
+    (sums, cubes, seen)
 }

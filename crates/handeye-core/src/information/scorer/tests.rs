@@ -7,7 +7,7 @@ use crate::camera::{Camera, Feature, Lens};
 use crate::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, ToolPoint, Trace,
 };
-use crate::information::{Belief, CandidateModel, Execution, Motions, Sight};
+use crate::information::{Belief, CandidateModel, Execution, Motions, Sight, Supposition};
 use crate::least_squares::{PixelParameters, Side};
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
@@ -265,6 +265,63 @@ proptest! {
         let tolerance = if count > 6 { 1e-7 } else { 1e-8 };
         for criterion in criteria() {
             scene.check(criterion.as_ref(), tolerance)?;
+        }
+    }
+}
+
+/// Parameters of a camera without distortion, in any order.
+#[test]
+fn sums_of_few_monomials_serve_the_camera_too() {
+    for (seed, camera) in [vec![0, 1, 2, 3], vec![3, 0, 2], vec![1], vec![2, 1, 3, 0]].into_iter().enumerate()
+    {
+        let random = &mut Random::new(20 + seed as u64);
+        let mut scene = Scene::new(random, Lens::Pinhole, 90, seed % 2 == 1, 0.0);
+        scene.robot = (seed > 1).then(|| (Side::Right, robot_root(random)));
+        let prior_information = DMatrix::zeros(camera.len(), camera.len());
+        scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false, prior_information });
+        scene.belief = scene.start();
+        scene.sight.fewest = 8;
+        scene.keep_distance();
+        for criterion in criteria() {
+            scene.check(criterion.as_ref(), 1e-9).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_mean_over_suppositions_is_the_mean_of_each() {
+    for lens in [Lens::Pinhole, Lens::BrownConrady5, Lens::KannalaBrandt] {
+        let random = &mut Random::new(30);
+        let mut scene = Scene::new(random, lens, 70, false, 0.0);
+        let prior_information = DMatrix::zeros(3, 3);
+        let camera = vec![0, 2, 4];
+        if lens != Lens::Pinhole {
+            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false, prior_information });
+            scene.belief = scene.start();
+        }
+        let wider = Belief::new(scene.belief.information() * 0.5).unwrap();
+        let supposed = [
+            Supposition { weight: 0.5, belief: &scene.belief, robot: None },
+            Supposition { weight: 0.2, belief: &wider, robot: Some((Side::Left, robot_root(random))) },
+            Supposition { weight: 0.3, belief: &wider, robot: Some((Side::Right, robot_root(random))) },
+        ];
+        let execution = Execution::default();
+        let motions = Motions::Transforms(&scene.motions);
+        for criterion in criteria() {
+            let criterion = criterion.as_ref();
+            let mean = scene.model().mean_gains(&supposed, criterion, motions, &execution).unwrap();
+            let mut expected = vec![0.0; mean.len()];
+            for one in &supposed {
+                let model = CandidateModel { robot: one.robot, ..scene.model() };
+                let gains = model.gains_by(one.belief, criterion, motions, &execution).unwrap();
+                for (sum, gain) in expected.iter_mut().zip(gains) {
+                    *sum += one.weight * gain;
+                }
+            }
+            for (mean, expected) in mean.iter().zip(&expected) {
+                let close = (mean - expected).abs() <= 1e-12 * expected.abs();
+                assert!(close || (mean.is_nan() && expected.is_nan()), "{mean} for {expected}");
+            }
         }
     }
 }

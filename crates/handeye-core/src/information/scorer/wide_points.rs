@@ -22,6 +22,13 @@ pub(super) enum Column {
     BoardScale,
 }
 
+impl Column {
+    /// Whether it is a parameter of the camera.
+    pub fn is_of_camera(&self) -> bool {
+        matches!(self, Self::Camera(_))
+    }
+}
+
 /// Sums the information, divided by `f_x^2`, of the points in sight, and counts them.
 pub(super) struct WidePoints<'a, const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool> {
     pub parameters: &'a [f64; MAX_PARAMETERS],
