@@ -272,7 +272,8 @@ def proposed(step: Step, store: SessionStore, prepared: Prepared, most: int) -> 
     drawn = generator.draw(estimate, [view.joints_rad or () for view in reversed(views)], random)
     gains = step.decision["candidates"]
     body, start = generator.body(estimate), standing(store)
-    chosen: list[np.ndarray] = []
+    # Where the loop climbed to something better than what was drawn, that comes first.
+    chosen = [np.array(step.goal.joints_rad)] if "refined" in step.decision else []
     for name in sorted(gains, key=lambda name: -gains[name]):
         if name in drawn.joints and body.obstacle_on_path(start, drawn.joints[name]) is None:
             chosen.append(drawn.joints[name])

@@ -6,6 +6,7 @@ A wrong shape, a parameter out of its range or a transform that is not rigid rai
 `handeye.errors.InputError`.
 """
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 from numpy import bool_, float32, float64, uint8
@@ -313,7 +314,7 @@ class Predictor:
 
     def mean_gains(
         self,
-        supposed: list[tuple[float, Belief, str | None, ArrayLike | None]],
+        supposed: Sequence[tuple[float, Belief, str | None, ArrayLike | None]],
         criterion: Criterion,
         motions: ArrayLike,
         *,
@@ -322,8 +323,8 @@ class Predictor:
     ) -> NDArray[float64]:
         """Gain (N,) of each candidate, averaged over what the robot's error may be.
 
-        `supposed`: weight, belief, `robot_side` and `robot_root`, in place of the predictor's own. The points of
-        a candidate are looked at once.
+        `supposed`: weight, belief, `robot_side` and `robot_root`, in place of the predictor's own. The points
+        of a candidate are looked at once.
         """
 
     def informations(self, motions: ArrayLike, *, jacobians: ArrayLike | None = None) -> NDArray[float64]:

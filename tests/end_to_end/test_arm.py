@@ -53,6 +53,18 @@ def test_plans_with_an_arm(handeye: Handeye, folder: Path) -> None:
     assert known["ranking"] != unknown["ranking"]
 
 
+def test_orders_views_by_the_time_of_motions(handeye: Handeye, folder: Path) -> None:
+    fast = handeye.json("plan", folder, "--together", "3", "--robot", "ur5e")["together"]
+    slow = handeye.json("plan", folder, "--together", "3", "--robot", "ur5e", "--speed-deg-s", "10")[
+        "together"
+    ]
+    assert (fast["measure"], fast["unit"], fast["speed_deg_s"]) == ("motion_time", "s", pytest.approx(30.0))
+    assert slow["total"] > 2 * fast["total"]
+    shown = " ".join(handeye("plan", folder, "--together", "3", "--robot", "ur5e").out.split())
+    assert "the shortest way" in shown
+    assert "no joint faster than 30 deg/s" in shown
+
+
 def test_what_cannot_be_used_is_said(handeye: Handeye, folder: Path, tmp_path: Path) -> None:
     assert handeye.fails("solve", folder, "--robot", "epson_c4l")["code"] == "wrong_arm"
     assert handeye.fails("solve", folder, "--robot", "lbr_iiwa_14")["code"] == "wrong_arm"

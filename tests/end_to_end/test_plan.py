@@ -130,3 +130,20 @@ def test_text(handeye: Handeye, folder: Path) -> None:
     first = next(line for line in outcome.out.splitlines() if line.strip().startswith("1 "))
     assert best["name"] in first
     assert f"{best['gain']:.3f}" in first
+
+
+def test_several_at_once_in_a_short_order(handeye: Handeye, folder: Path) -> None:
+    data = handeye.json("plan", folder, "--together", "3")["together"]
+    names = [view["name"] for view in data["views"]]
+    assert len(set(names)) == 3
+    assert set(names) <= {entry["name"] for entry in handeye.json("plan", folder)["ranking"]}
+    assert sum(view["leg"] for view in data["views"]) == pytest.approx(data["total"])
+    assert data["total"] <= data["total_as_chosen"] + 1e-12
+    assert (data["measure"], data["unit"], data["speed_deg_s"]) == ("pose_distance", "m", None)
+    assert data["from"] == "view_02"
+    text = handeye("plan", folder, "--together", "3").out
+    assert "as the joints of some are not known" in " ".join(text.split())
+    assert handeye.json("plan", folder)["together"] is None
+    for bad in (("--together", "0"), ("--together", "2", "--criterion", "trace"), ("--speed-deg-s", "0")):
+        assert handeye.fails("plan", folder, *bad)["exit_code"] == 2
+    assert handeye.fails("plan", folder, "--together", "99")["code"] == "too_few_candidates"

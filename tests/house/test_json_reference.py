@@ -90,6 +90,7 @@ def test_plan(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     compare(
         "handeye plan",
         handeye.json("plan", shipped),
+        handeye.json("plan", shipped, "--together", "3"),
         handeye.json("plan", shipped, "--candidates", poses),
         handeye.json("plan", open_directions),
     )

@@ -14,6 +14,7 @@ from handeye.cli.arm import ArmSource
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
+from handeye.cli.plan_together import Together, check_together, choose_together, show_together, together_data
 from handeye.cli.source import Source, mindful_of
 from handeye.datasets import read_poses_csv
 from handeye.errors import InputError
@@ -51,6 +52,7 @@ class _Plan:
     warnings: tuple[str, ...]
     estimate: Estimate
     ranking: Ranking
+    batch: Together | None
 
 
 def plan(
@@ -64,6 +66,8 @@ def plan(
     tool_point_mm: tuple[float, float, float] | None = None,
     model: ModelName = ModelName.AUTO,
     top: int | None = None,
+    together: int | None = None,
+    speed_deg_s: float = 30.0,
     margin_px: float = 0.0,
     fewest: int | None = None,
     output: Path | None = None,
@@ -98,6 +102,11 @@ def plan(
         auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
     top
         Rank only so many candidates; without it the text shows ten.
+    together
+        Also choose so many views at once, and the order in which the arm travels least from where the last
+        view was taken.
+    speed_deg_s
+        No joint moves faster; for that order.
     margin_px
         Distance from the border of the image that a candidate from a file must keep.
     fewest
@@ -107,6 +116,9 @@ def plan(
     """
     check_output(output)
     _check(used, first, top)
+    check_together(together, criterion)
+    if not 0 < speed_deg_s < float("inf"):
+        raise UsageError(f"--speed-deg-s {speed_deg_s}, expected above zero")
     worth = _criterion(criterion, tool_point_mm)
     table = None if candidates is None else read_poses_csv(candidates)
     opened = source.open(folder)
@@ -125,9 +137,23 @@ def plan(
     warnings = (*opened.warnings, *(() if table is None else table.warnings))
     with mindful_of(warnings):
         start = measurements.select([names.index(name) for name in taken])
-        estimator = make_estimator(model, arm.kinematics(opened.recording, model))
+        kinematics = arm.kinematics(opened.recording, model)
+        estimator = make_estimator(model, kinematics)
         planner = Planner(start, pool, estimator, options)
         ranking = rank(planner.estimate, planner.pool, worth, sight, gains=planner.gains(), top=top)
+        batch = None
+        if together is not None:
+            batch = choose_together(
+                together,
+                planner.estimate,
+                planner.pool,
+                sight,
+                start.views[-1],
+                criterion=criterion,
+                tool_point_m=None if tool_point_mm is None else [v / MM_PER_M for v in tool_point_mm],
+                kinematics=kinematics,
+                speed_rad_s=float(np.deg2rad(speed_deg_s)),
+            )
     # The planner leaves out what is taken; a person may wonder where it is.
     again = {name: "a view of this name is taken already" for name in taken if name in _names(pool)}
     ranking = replace(ranking, infeasible=ranking.infeasible | again)
@@ -138,6 +164,7 @@ def plan(
         tuple(str(warning) for warning in warnings),
         planner.estimate,
         ranking,
+        batch,
     )
     data = _data(found)
     if output is not None:
@@ -212,6 +239,7 @@ def _data(found: _Plan) -> dict[str, Any]:
         "unobservable": [direction.to_dict() for direction in estimate.unobservable],
         "feasible_count": found.ranking.feasible_count,
         "ranking": [_prospect(number, p) for number, p in enumerate(found.ranking.prospects, start=1)],
+        "together": None if found.batch is None else together_data(found.batch),
         "infeasible": [{"name": name, "reason": why} for name, why in found.ranking.infeasible.items()],
         "warnings": list(found.warnings),
     }
@@ -258,6 +286,8 @@ def _show(console: "Console", found: _Plan, shown: int) -> None:
     beyond = ranking.feasible_count - min(shown, len(ranking.prospects))
     if beyond > 0:
         console.print(f"and {beyond} more (--top shows them)")
+    if data["together"] is not None:
+        show_together(console, data["together"])
     cannot = [f"{name}: {why}" for name, why in ranking.infeasible.items()]
     more = [f"and {len(cannot) - shown} more (--json lists them)"] if len(cannot) > shown else []
     notices(console, "Cannot be taken", [*cannot[:shown], *more])
