@@ -99,6 +99,7 @@ def test_links_stand_in_the_result() -> None:
     known = arm_kinematics(ARM, recording.views)
     calibration = calibrate(Measurements.of_recording(recording), kinematics=known)
     assert calibration.noise.robot_side is RobotSide.LINKS
+    assert "blame_robot_links" in [finding.code for finding in calibration.diagnosis]
     told = json.loads(json.dumps(calibration.to_dict()))
     assert [error["joint"] for error in told["link_errors"]] == list(ARM.joint_names)
     assert told["link_errors"][0]["translation_mm"] == [0.0, 0.0, 0.0]

@@ -155,4 +155,7 @@ def _noise(calibration: Calibration) -> str:
     if noise.robot_side is RobotSide.JOINTS:
         joints = f"from {figures(float(np.rad2deg(noise.joint_rad)), 2)} deg in every joint"
         return f"{pixel}; robot {robot} per axis at the flange, {joints}{certainty}"
+    if noise.robot_side is RobotSide.LINKS:
+        put_right = "from joints that sit wrongly on their links, put right in the answer"
+        return f"{pixel}; robot {robot} per axis at the flange, {put_right}{certainty}"
     return f"{pixel}; robot {robot} per axis, on the side of the {noise.robot_side}{certainty}"

@@ -13,6 +13,11 @@ _ADVICE = {
         "The arm is the limit, as if its base moved: a base that gives way, or errors of the first joints. "
         "Views close to where the work is matter most then."
     ),
+    "blame_robot_links": (
+        "The arm is not built quite as described. The answer is that of the arm as it is, and poses are put "
+        "right by what was found of its links (link_errors in the result). Where the controller's poses are "
+        "used as they are, solve without the arm: that answer fits them better."
+    ),
     "blame_camera": (
         "Calibrate the camera anew, with the focus and the size of image that are used here, and the board "
         "near all edges of the image."

@@ -14,6 +14,7 @@ from handeye import _core
 from handeye.solving.auto import CameraPrior, camera_prior
 from handeye.solving.estimate import Estimate, side_of_chain
 from handeye.solving.joints import JointModel
+from handeye.solving.links import LinkModel
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Finding, RobotSide
@@ -74,6 +75,7 @@ def suspects(measurements: Measurements, estimate: Estimate) -> tuple[Suspect, .
             Suspect(f"robot_{side.value}", f"the robot ({side.value} side)", evidence - exact, words)
         )
     found += _joints(measurements, estimate, calibrated, exact)
+    found += _links(measurements, estimate, calibrated, exact)
     fixed, reference = _evidence(measurements, estimate, CameraPrior((), np.zeros((0, 0))))
     noise = _robot_noise(reference)
     prior = camera_prior(measurements.camera, CAMERA_BLAME_INFLATION)
@@ -132,6 +134,21 @@ def _joints(
     words = f"{worst.joint} stands {value} beyond where it is read"
     found.append(Suspect("robot_joint_offsets", "a constant error of the joints", evidence - exact, words))
     return found
+
+
+def _links(
+    measurements: Measurements, estimate: Estimate, calibrated: CameraPrior, exact: float
+) -> list[Suspect]:
+    """Joints displaced on the links of a robot that is exact otherwise; nothing if the arm is not known."""
+    if estimate.kinematics is None:
+        return []
+    links = LinkModel.of(estimate.kinematics, measurements)
+    evidence, posterior = _evidence(
+        measurements, estimate, calibrated, sides=[], links=links.errors(), exact_robot=0.0
+    )
+    _, translation, rotation, _ = posterior.hypotheses[0]
+    words = f"each sits off by about {translation * 1e3:.2g} mm and {np.rad2deg(rotation):.2g} deg"
+    return [Suspect("robot_links", "where the joints sit on their links", evidence - exact, words)]
 
 
 def time_lag_jacobians(measurements: Measurements) -> FloatArray | None:
@@ -200,6 +217,7 @@ def _evidence(
     sides: list[str] | None = None,
     board_scale: bool = False,
     joints: _core.JointErrors | None = None,
+    links: _core.LinkErrors | None = None,
     exact_robot: float | None = None,
 ) -> tuple[float, _core.Posterior]:
     """Return the logarithm of the evidence of one hypothesis, and its posterior.
@@ -222,6 +240,7 @@ def _evidence(
         else exact_robot,
         sides=sides,
         joints=joints,
+        links=links,
         linearisations=10,
     )
     # The prior's own normalisation, which the sum over hypotheses leaves out.
