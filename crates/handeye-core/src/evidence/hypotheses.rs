@@ -24,6 +24,8 @@ pub struct Hypothesis {
     pub rotation_rad: f64,
     /// How the errors of different views hang together.
     pub nature: Nature,
+    /// Share of the variance of displaced joints that is another in each view: encoders, play, bending.
+    pub own_share: f64,
     /// Standard deviation of the noise of the joints, radians; zero for none. Needs [`super::JointErrors`].
     pub joint_rad: f64,
     /// Standard deviation of the offsets of the joints, radians; meaningless without [`super::JointErrors`].
@@ -40,6 +42,7 @@ impl Hypothesis {
             translation_m: 0.0,
             rotation_rad: 0.0,
             nature: Nature::White,
+            own_share: 0.0,
             joint_rad: 0.0,
             offset_rad: EXACT_OFFSET_RAD,
             log_prior,
@@ -57,14 +60,22 @@ impl Hypothesis {
     }
 
     /// Joints displaced on their links by these standard deviations per axis.
-    pub fn links(translation_m: f64, rotation_rad: f64, log_prior: f64) -> Self {
-        Self { translation_m, rotation_rad, nature: Nature::Links, ..Self::exact(log_prior) }
+    pub fn links(translation_m: f64, rotation_rad: f64, own_share: f64, log_prior: f64) -> Self {
+        let nature = Nature::Links;
+        Self { translation_m, rotation_rad, nature, own_share, ..Self::exact(log_prior) }
     }
 
     /// Whether the noise is the same, whatever the offsets.
     pub(super) fn same_noise(&self, other: &Self) -> bool {
-        (self.side, self.translation_m, self.rotation_rad, self.nature, self.joint_rad)
-            == (other.side, other.translation_m, other.rotation_rad, other.nature, other.joint_rad)
+        (self.side, self.translation_m, self.rotation_rad, self.nature, self.own_share, self.joint_rad)
+            == (
+                other.side,
+                other.translation_m,
+                other.rotation_rad,
+                other.nature,
+                other.own_share,
+                other.joint_rad,
+            )
     }
 }
 
@@ -190,6 +201,9 @@ impl Default for LevelPrior {
     }
 }
 
+/// What of the error of displaced joints may be another in each view, equally likely.
+const OWN_SHARES: [f64; 3] = [0.003, 0.04, 0.5];
+
 impl LevelPrior {
     /// Of the joints of an arm, displaced on their links: a lever is metres of displacement per radian of tilt.
     pub fn of_links() -> Self {
@@ -275,11 +289,11 @@ impl LevelPrior {
         }
         if let Some(links) = links {
             let levels = links.levels(links.rotation_grid, links.lever_grid);
-            grid.extend(
-                levels
-                    .into_iter()
-                    .map(|(rotation, lever, log)| Hypothesis::links(rotation * lever, rotation, log + each)),
-            );
+            let log_count = (OWN_SHARES.len() as f64).ln();
+            grid.extend(levels.into_iter().flat_map(|(rotation, lever, log)| {
+                let log = log + each - log_count;
+                OWN_SHARES.map(|own| Hypothesis::links(rotation * lever, rotation, own, log))
+            }));
         }
         grid
     }
@@ -310,7 +324,7 @@ mod tests {
         assert!((by_kind(|h| h.nature == Nature::Links) - 1.0 / 6.0).abs() < 1e-12);
         assert!((by_kind(|h| h.side == Some(Side::Right)) - 1.0 / 6.0).abs() < 1e-12);
         let grid = prior.with_offsets(&noise);
-        assert_eq!(grid.len(), (1 + 2 * 72 + 13) * 8 + 24);
+        assert_eq!(grid.len(), (1 + 2 * 72 + 13) * 8 + 3 * 24);
         let total: f64 = grid.iter().map(|h| h.log_prior.exp()).sum();
         assert!((total - 1.0).abs() < 1e-12);
         let exact: f64 =

@@ -9,9 +9,6 @@ use nalgebra::{DMatrix, Matrix6};
 
 use crate::error::Error;
 
-/// Share of the error's variance that is another in each view: encoders, play, bending.
-const OWN_SHARE: f64 = 0.005;
-
 /// How displaced joints move the motions of the views.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinkErrors {
@@ -33,19 +30,20 @@ impl LinkErrors {
     }
 
     /// Writes what a standard deviation of each coefficient does to view `k` in the camera frame into 6 rows, and
-    /// returns the covariance of what is the view's own.
+    /// returns the covariance of what is the view's own: a share of the error's variance.
     pub(super) fn fill(
         &self,
         k: usize,
         left: &Matrix6<f64>,
         levels: (f64, f64),
+        own_share: f64,
         rows: &mut DMatrix<f64>,
     ) -> Matrix6<f64> {
         let mut own = Matrix6::zeros();
         for (i, column) in self.jacobians[k].column_iter().enumerate() {
             let moved = left * column * self.deviation(i, levels.0, levels.1);
-            own += moved * moved.transpose() * OWN_SHARE;
-            rows.fixed_view_mut::<6, 1>(0, i).copy_from(&(moved * (1.0 - OWN_SHARE).sqrt()));
+            own += moved * moved.transpose() * own_share;
+            rows.fixed_view_mut::<6, 1>(0, i).copy_from(&(moved * (1.0 - own_share).sqrt()));
         }
         own
     }

@@ -327,7 +327,7 @@ fn links_that_do_not_fit_the_views_are_refused() {
     let cell = Cell::new(1, 5);
     let views = compressed(&cell, &cell.motions, 0.1, 1);
     let chosen: Vec<&CompressedView> = views.iter().collect();
-    let grid = [Hypothesis::links(1e-3, 1e-3, 0.0)];
+    let grid = [Hypothesis::links(1e-3, 1e-3, 0.01, 0.0)];
     for links in [None, Some(LinkErrors { jacobians: vec![DMatrix::zeros(6, 2); 4], lengths: vec![true; 2] })]
     {
         let options = EvidenceOptions {

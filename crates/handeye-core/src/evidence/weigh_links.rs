@@ -30,7 +30,7 @@ impl LinkSums {
         let mut sums = DMatrix::zeros(m + size, m + size);
         let mut log_determinant = 0.0;
         for (k, view) in views.iter().enumerate() {
-            let own = links.fill(k, view.left(), levels, &mut whitened);
+            let own = links.fill(k, view.left(), levels, noise.own_share, &mut whitened);
             let factor = (view.pixel_covariance() + own).cholesky()?;
             let lower = factor.l();
             log_determinant += 2.0 * (0..6).map(|i| lower[(i, i)].ln()).sum::<f64>();
