@@ -40,14 +40,15 @@ pub fn features(py: Python<'_>, points: &Array<'_>, radii: &Array<'_>) -> PyResu
     if count != radii.len() {
         return Err(invalid(py, &format!("{count} points but {} radii", radii.len())));
     }
-    // Collected into a `Result` it would grow step by step.
-    let mut features = Vec::with_capacity(count);
-    for (i, (position, radius)) in points.chunks_exact(3).zip(radii).enumerate() {
-        let feature = Feature::new(Vector3::from_column_slice(position), radius)
-            .map_err(|error| invalid(py, &format!("feature {i}: {error}")))?;
-        features.push(feature);
+    let all = || points.chunks_exact(3).zip(&radii).map(|(p, r)| (Vector3::new(p[0], p[1], p[2]), *r));
+    if points.iter().all(|x| x.is_finite()) && radii.iter().all(|r| r.is_finite() && *r >= 0.0) {
+        return Ok(all().map(|(position, radius)| Feature { position, radius }).collect());
     }
-    Ok(features)
+    // One by one, to say which.
+    let one = |(i, (position, radius))| {
+        Feature::new(position, radius).map_err(|error| invalid(py, &format!("feature {i}: {error}")))
+    };
+    all().enumerate().map(one).collect()
 }
 
 #[pyfunction]

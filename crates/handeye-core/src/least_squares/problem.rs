@@ -67,7 +67,7 @@ impl Problem {
         let whitening = covariances.map(|all| whitening(all, pixels.len())).transpose()?;
         let mut problem = Self { camera, features, pixels, whitening, offsets, motions, measurements: None };
         let views: Vec<usize> = (0..problem.view_count()).collect();
-        problem.measurements = Measurements::new(&problem, &views);
+        problem.measurements = Measurements::new(&problem, &views, false);
         Ok(problem)
     }
 
