@@ -1,7 +1,7 @@
 //! numpy to nalgebra and back, with shape checks that name the argument.
 //!
 //! Everything is copied on the way in, so that the interpreter lock can be released afterwards; only long arrays that
-//! are read once ([`rows`], [`row_major`]) stay where they are.
+//! are read once ([`rows`], [`entries`], [`row_major`]) stay where they are.
 
 use std::borrow::Cow;
 
@@ -44,8 +44,13 @@ pub fn vectors<const D: usize>(
 
 /// Entries of an `(N,)` array.
 pub fn scalars(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Vec<f64>> {
+    Ok(entries(py, name, array)?.into_owned())
+}
+
+/// As [`scalars`], in place where they lie in a row.
+pub fn entries<'a>(py: Python<'_>, name: &str, array: &'a Array<'_>) -> PyResult<Cow<'a, [f64]>> {
     check_shape(py, name, array, &[None])?;
-    Ok(in_place(array).into_owned())
+    Ok(in_place(array))
 }
 
 /// Entries of an `(N, D)` array in row-major order, in place where they lie that way.
