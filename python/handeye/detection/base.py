@@ -137,7 +137,12 @@ def affine(source: FloatArray, destination: FloatArray) -> tuple[FloatArray, Flo
     centre = source.mean(axis=0)
     shift = destination.mean(axis=0)
     flat = source - centre
-    A = np.asarray(np.linalg.pinv(flat.T @ flat) @ flat.T @ (destination - shift), dtype=np.float64)
+    (a, b), (_, d) = square = flat.T @ flat
+    determinant = a * d - b * b
+    # Points on a line leave the rest open; then the least of all answers is taken.
+    degenerate = determinant <= 1e-12 * (a + d) ** 2
+    inverse = np.linalg.pinv(square) if degenerate else np.array([[d, -b], [-b, a]]) / determinant
+    A = np.asarray(inverse @ (flat.T @ (destination - shift)), dtype=np.float64)
     return A, shift - centre @ A
 
 
