@@ -30,8 +30,9 @@ from handeye.planning.collisions import Workspace
 from handeye.planning.feasibility import Generator
 from handeye.planning.sieve import ViewLimits, mounted_points
 from handeye.session.configuration import Configuration, Prepared, Simulation, begin, prepare
+from handeye.session.deciding import Step
 from handeye.session.entry import Failure
-from handeye.session.loop import End, Session, Step
+from handeye.session.loop import End, Session
 from handeye.session.store import SessionStore
 from handeye.types import Mounting
 
@@ -246,7 +247,7 @@ def look(
                 found["paths"] += whole
                 for fault in faults(joints, step, store, prepared, checker, whole_path=whole):
                     found[fault] += 1
-        session._take(step)  # noqa: SLF001 - the loop's own next half
+        session.take(step)
         last = store.entries[-1]
         if step.phase == "plan" and last.moved:
             found["reached"] += 1

@@ -1,11 +1,12 @@
 """Measure detection: time with and without a prediction, accuracy, and views lost.
 
     python tools/measure_detection.py speed
-    python tools/measure_detection.py rendered --first 0 --count 200
+    python tools/measure_detection.py rendered --first 0 --count 200 --rows rows.csv
+    python tools/measure_detection.py summary --rows rows.csv
     HANDEYE_DATA=... python tools/measure_detection.py public
 
-Times are of one processor, least of several; parts of the 1,000 rendered views can be measured one after the
-other.
+Times are of one processor; those of `speed` are the least of several, the others medians over the views.
+Parts of the 1,000 rendered views can be measured one after the other: their rows are added to a file.
 """
 
 import argparse
@@ -21,6 +22,7 @@ from handeye.cameras.render import Appearance, BoardRenderer, clutter
 from handeye.datasets import ImageSet, load
 from handeye.datasets.images import read_image
 from handeye.detection import Detection, NotFound, Prediction, calibrate_camera, detect, relabeled
+from handeye.detection.registration import printed
 from handeye.types import AprilGrid, Camera, Charuco, Chessboard, CircleGrid, Pose, Target
 
 WIDTH, HEIGHT = 1280, 1024
@@ -70,6 +72,12 @@ def off(pixels: np.ndarray, random: np.random.Generator) -> Prediction:
     return Prediction((pixels - middle) @ turn + middle + random.normal(scale=ERROR_PX, size=2), MARGIN_PX)
 
 
+def draw(target: Target) -> None:
+    """Draw the picture of a target, which is done once for all its images."""
+    board = printed(target)
+    _ = board.steepest, board.inverse
+
+
 def timed(image: np.ndarray, target: Target, predicted: Prediction | None, rounds: int = 3) -> float:
     """Least processor time in ms."""
     times: list[float] = []
@@ -80,14 +88,15 @@ def timed(image: np.ndarray, target: Target, predicted: Prediction | None, round
     return 1e3 * min(times)
 
 
-def largest_difference(target: Target, a: Detection, b: Detection) -> float:
-    """Largest distance in px of points found both ways, under the labels that look the same and fit best."""
-    best = np.inf
+def differences(target: Target, a: Detection, b: Detection) -> tuple[float, float]:
+    """Largest and root mean square distance in px of points found both ways, under the best of the labels."""
+    best = np.inf, np.inf
     for permutation in target.symmetries:
         named = relabeled(b, permutation)
         common, here, there = np.intersect1d(a.point_ids, named.point_ids, return_indices=True)
         if len(common):
-            best = min(best, float(np.linalg.norm(a.pixels[here] - named.pixels[there], axis=1).max()))
+            away = np.linalg.norm(a.pixels[here] - named.pixels[there], axis=1)
+            best = min(best, (float(away.max()), float(np.sqrt((away**2).mean()))))
     return best
 
 
@@ -123,7 +132,7 @@ def speed(views: int) -> None:
             )
 
 
-def rendered(first: int, count: int) -> None:
+def rendered(first: int, count: int, file: Path | None) -> None:
     """Print, for some of the rendered views, what was found with and without a prediction, and how well."""
     names = list(TARGETS)
     backgrounds = [110.0, *(clutter(WIDTH, HEIGHT, np.random.default_rng(seed)) for seed in range(3))]
@@ -139,6 +148,7 @@ def rendered(first: int, count: int) -> None:
         pose = posed(target, float(random.uniform(0.2, 0.75)), random)
         image, truth = renderers[name, ground].image(pose, random), projected(target, pose)
         prediction = off(truth, random)
+        draw(target)
         began = time.process_time()
         whole = detect(image, target)
         middle = time.process_time()
@@ -149,6 +159,20 @@ def rendered(first: int, count: int) -> None:
         rows[name].append((*row, error, middle - began, ended - middle))
         if row[0] and not row[1]:
             print(f"lost: view {number}, {name}: {part}")
+    for name, found in rows.items():
+        report(name, found)
+    if file is not None:
+        with file.open("a", encoding="utf-8") as out:
+            for name, found in rows.items():
+                out.writelines(f"{name};{';'.join(map(repr, map(float, row)))}\n" for row in found)
+
+
+def summary(file: Path) -> None:
+    """Print what the rows of a file say together."""
+    rows: dict[str, list[tuple[float, ...]]] = {}
+    for line in file.read_text(encoding="utf-8").splitlines():
+        name, *values = line.split(";")
+        rows.setdefault(name, []).append(tuple(map(float, values)))
     for name, found in rows.items():
         report(name, found)
 
@@ -166,6 +190,7 @@ def public(root: Path) -> None:
         for shot in images.shots:
             image = read_image(images.image_path(shot))
             size = image.shape[::-1]
+            draw(images.target)
             began = time.process_time()
             whole = detect(image, images.target)
             middle = time.process_time()
@@ -189,12 +214,13 @@ def public(root: Path) -> None:
 
 
 def compared(target: Target, whole: Detection | NotFound, part: Detection | NotFound) -> tuple[float, ...]:
-    """Found whole, found with the prediction, points each way, largest difference in px."""
+    """Found whole, found with the prediction, points each way, largest and mean square difference in px."""
     a, b = isinstance(whole, Detection), isinstance(part, Detection)
-    difference = np.nan
+    largest, mean = np.nan, np.nan
     if isinstance(whole, Detection) and isinstance(part, Detection):
-        difference = largest_difference(target, whole, part)
-    return float(a), float(b), len(whole) if a else 0, len(part) if b else 0, difference
+        largest, mean = differences(target, whole, part)
+    numbers = [len(found) if isinstance(found, Detection) else 0 for found in (whole, part)]
+    return float(a), float(b), *numbers, largest, mean
 
 
 def report(name: str, rows: list[tuple[float, ...]]) -> None:
@@ -204,14 +230,16 @@ def report(name: str, rows: list[tuple[float, ...]]) -> None:
     table = np.array(rows)
     lost = int(((table[:, 0] > 0) & (table[:, 1] == 0)).sum())
     gained = int(((table[:, 0] == 0) & (table[:, 1] > 0)).sum())
-    finite = table[np.isfinite(table[:, 4]), 4]
-    worst = float(finite.max()) if len(finite) else float("nan")
-    error = f"{np.nanmedian(table[:, 5]):.3f}" if np.isfinite(table[:, 5]).any() else "-"
+    worst, mean = np.nanmax(table[:, 4]), np.sqrt(np.nanmean(table[:, 5] ** 2))
+    error = f"{np.nanmedian(table[:, 6]):.3f}" if np.isfinite(table[:, 6]).any() else "-"
+    # Views that are not found are looked for in the whole image both ways.
+    found = table[table[:, 0] > 0]
+    before, after = 1e3 * np.median(found[:, 7]), 1e3 * np.median(found[:, 8])
     print(
         f"{name}: {len(rows)} views, found {int(table[:, 0].sum())} whole and {int(table[:, 1].sum())} "
         f"predicted ({lost} lost, {gained} gained), points {int(table[:, 2].sum())} and "
-        f"{int(table[:, 3].sum())}, largest difference {worst:.4f} px, median error {error} px, "
-        f"{1e3 * table[:, 6].mean():.0f} and {1e3 * table[:, 7].mean():.0f} ms",
+        f"{int(table[:, 3].sum())}, difference {worst:.4f} px at most, {mean:.4f} px root mean square, "
+        f"median error {error} px, medians {before:.0f} and {after:.1f} ms, ratio {before / after:.1f}",
         flush=True,
     )
 
@@ -221,16 +249,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("speed", "rendered", "public"))
+    parser.add_argument("what", choices=("speed", "rendered", "summary", "public"))
     parser.add_argument("--first", type=int, default=0, help="number of the first rendered view")
     parser.add_argument("--count", type=int, default=1000, help="number of rendered views")
+    parser.add_argument(
+        "--rows", type=Path, help="file that rows of rendered views are added to or read from"
+    )
     parser.add_argument("--views", type=int, default=4, help="views per line of the table of speed")
     options = parser.parse_args()
     cv2.setNumThreads(1)
     if options.what == "speed":
         speed(options.views)
     elif options.what == "rendered":
-        rendered(options.first, options.count)
+        rendered(options.first, options.count, options.rows)
+    elif options.what == "summary":
+        summary(options.rows)
     else:
         public(Path(os.environ["HANDEYE_DATA"]))
 

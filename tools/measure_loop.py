@@ -25,8 +25,8 @@ import numpy as np
 from handeye.robots.simulated import ArmErrors
 from handeye.session.attempt import Patience
 from handeye.session.configuration import Configuration, Simulation, begin, prepare
+from handeye.session.deciding import EndReason
 from handeye.session.faults import FaultRates
-from handeye.session.loop import EndReason
 from handeye.types import Mounting
 
 MODELLED = ("none", "white_flange", "white_base", "encoder", "joint_offsets")

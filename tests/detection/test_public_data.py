@@ -12,8 +12,8 @@ from handeye.detection import Detection, Prediction, calibrate_camera, detect
 # Every so many views; `tools/measure_detection.py public` looks at all.
 STEP = 9
 SETS = {"CS_synthetic_1": 15, "CS_synthetic_2": 19, "CS_synthetic_3": 30, "kuka_1": 30, "kuka_2": 28}
-# Largest difference made by the prediction: other starts of the fit, in noisy pictures.
-SAME_PX = 0.03
+# Largest difference made by the prediction.
+SAME_PX = 0.01
 
 
 def check(folder: Path, views: int, fewest: float, error_px: float) -> None:

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from commands import Handeye
+from folders import made_recording, written
 from handeye.robots import open_arm
 from handeye.robots.notations import Notation, read_pose_text
 
 QUICK = ("--points-only", "0.1", "--seed", "5")
+LOOSE = ("--accuracy-mm", "5", "--accuracy-deg", "0.5")
 
 
 def test_a_session_is_run_resumed_and_solved(handeye: Handeye, tmp_path: Path) -> None:
@@ -90,3 +92,23 @@ def test_a_run_that_fails_ends_in_words_and_can_be_resumed(handeye: Handeye, tmp
     assert outcome.code == 8
     assert outcome.error["code"] == "too_many_failures"
     assert "--resume" in outcome.error["hint"]
+
+
+def test_through_the_views_of_a_recording(handeye: Handeye, tmp_path: Path) -> None:
+    folder = written(made_recording(9), tmp_path / "source")
+    data = handeye.json("run", "--session", tmp_path / "s", "--driver", f"replay:{folder}", *LOOSE)
+    assert (data["end"], data["request_met"]) == ("accuracy_reached", True)
+    assert data["collisions_judged"].startswith("none")
+    assert data["true_error"]["translation_mm"] < 0.5
+    assert data["views"] == 6
+    assert handeye.json("run", "--resume", "--session", tmp_path / "s")["calibration"] == data["calibration"]
+    assert (tmp_path / "s" / "report.html").is_file()
+    again = handeye.json("run", "--session", tmp_path / "t", "--driver", f"replay:{tmp_path / 's'}", *LOOSE)
+    assert again["views"] == 6
+    error = handeye.fails(
+        "run", "--session", tmp_path / "u", "--driver", f"replay:{folder}", "--mounting", "eye-to-hand"
+    )
+    assert error["exit_code"] == 2
+    assert handeye.fails("run", "--dry-run", "--driver", f"replay:{folder}")["exit_code"] == 2
+    missing = handeye.fails("run", "--session", tmp_path / "u", "--driver", f"replay:{tmp_path / 'none'}")
+    assert missing["exit_code"] == 3

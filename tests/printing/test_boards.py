@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from handeye.cameras.pattern import pattern_of
 from handeye.detection import Detection, detect
 from handeye.errors import InputError
+from handeye.pattern import pattern_of
 from handeye.printing import BOARDS, Measures, Paper, board_of, lay_out
 from handeye.printing.boards import ink_of
 from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid, Target

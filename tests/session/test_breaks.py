@@ -12,9 +12,9 @@ from handeye.errors import InputError, OutputError
 from handeye.session import store as store_module
 from handeye.session.attempt import Cell
 from handeye.session.configuration import begin, go_on, prepare
+from handeye.session.deciding import EndReason
 from handeye.session.entry import Entry
 from handeye.session.faults import FaultRates
-from handeye.session.loop import EndReason
 from handeye.session.store import create_session, open_session, read_journal
 from sessions import Outcome, configured, run, run_killed
 
@@ -132,7 +132,7 @@ def test_two_processes_do_not_write_one_session(tmp_path: Path) -> None:
 def test_a_full_disk_is_waited_for_and_then_a_clear_stop(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("handeye.session.loop._WRITE_PAUSE_S", 0.0)
+    monkeypatch.setattr("handeye.session.taking._WRITE_PAUSE_S", 0.0)
     append, full = store_module.SessionStore.append, [2]
 
     def appending(self: store_module.SessionStore, entry: Entry) -> None:

@@ -12,14 +12,17 @@ from handeye.datasets import read_recording
 from handeye.errors import DeviceError, InputError
 from handeye.robots import ArmKinematics, open_arm
 from handeye.robots.protocol import Goal
-from handeye.session.attempt import Missed, Patience, attempt
+from handeye.session.attempt import Cell, Missed, Patience, attempt
+from handeye.session.choosing import ArmChooser
 from handeye.session.configuration import Configuration, Prepared, begin, prepare
+from handeye.session.deciding import EndReason
 from handeye.session.entry import Failure
 from handeye.session.faults import FaultRates
-from handeye.session.loop import End, EndReason, Session, Wish
+from handeye.session.loop import End, Session
 from handeye.session.patience import within
-from handeye.session.simulated import SimulationOptions, simulated_cell
+from handeye.session.simulated import SimulatedCell, SimulationOptions, simulated_cell
 from handeye.session.store import SessionStore, create_session
+from handeye.session.wish import Wish
 from handeye.solving import solve
 from handeye.types import Chessboard, CircleGrid, Mounting, Pose
 from sessions import configured
@@ -31,6 +34,13 @@ def ended(configuration: Configuration, folder: Path) -> tuple[End, Prepared, Se
     end = session.run()
     store.close()
     return end, prepared, store
+
+
+def session_of(made: SimulatedCell, cell: Cell, store: SessionStore, wish: Wish) -> Session:
+    assert cell.arm is not None
+    assert cell.workspace is not None
+    chooser = ArmChooser(cell.arm, cell.workspace, cell.camera, made.start, wish)
+    return Session(cell, store, chooser, wish)
 
 
 def true_error(end: End, prepared: Prepared) -> tuple[float, float]:
@@ -71,7 +81,7 @@ def test_a_camera_that_renders_and_a_detector_that_detects(tmp_path: Path) -> No
     options = SimulationOptions(seed=4, target=Chessboard(5, 7, 0.03), camera_error=0.0, optics=Optics())
     made = simulated_cell(open_arm("epson_c4l"), options)
     store = create_session(tmp_path / "s", made.recording, {})
-    end = Session(made.cell, store, made.start, Wish(most_views=3, seed=4)).run()
+    end = session_of(made, made.cell, store, Wish(most_views=3, seed=4)).run()
     store.close()
     assert end.views == 3
     loaded = read_recording(tmp_path / "s")
@@ -102,7 +112,7 @@ def test_labels_of_a_board_that_looks_the_same_when_turned(tmp_path: Path) -> No
 
     cell = replace(made.cell, source=Turning())
     store = create_session(tmp_path / "s", made.recording, {})
-    end = Session(cell, store, made.start, Wish(seed=8)).run()
+    end = session_of(made, cell, store, Wish(seed=8)).run()
     store.close()
     assert end.reason is EndReason.ACCURACY_REACHED
     assert end.views == end.attempts

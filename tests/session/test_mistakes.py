@@ -7,7 +7,8 @@ import numpy as np
 
 from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.session.configuration import begin, prepare
-from handeye.session.loop import End, EndReason
+from handeye.session.deciding import EndReason
+from handeye.session.loop import End
 from handeye.solving.mistakes import CODES
 from handeye.types import Pose
 from sessions import configured

@@ -15,6 +15,7 @@ pub mod picture;
 pub mod planar_pose;
 pub mod planning;
 pub mod pose;
+mod positive;
 pub mod se3;
 pub mod simd;
 pub mod testing;

@@ -136,7 +136,8 @@ impl Se3 {
         }
         let rotation: Matrix3<f64> = m.fixed_view::<3, 3>(0, 0).into_owned();
         let last = m.row(3);
-        let deviation = (rotation.transpose() * rotation - Matrix3::identity())
+        let gram = rotation.transpose() * rotation;
+        let deviation = (gram - Matrix3::identity())
             .amax()
             .max(last[0].abs())
             .max(last[1].abs())
@@ -146,13 +147,14 @@ impl Se3 {
             return Err(Error::NotRigid { deviation });
         }
         let translation = m.fixed_view::<3, 1>(0, 3).into_owned();
-        // Newton-Schulz: from a deviation below RIGID_TOLERANCE two steps reach rounding, without an SVD.
+        // Newton-Schulz squares the deviation: two steps reach rounding from RIGID_TOLERANCE, without an SVD.
+        let polished = |r: Matrix3<f64>, gram: Matrix3<f64>| r * (Matrix3::identity() * 1.5 - gram * 0.5);
         let mut rotation = rotation;
         if deviation > 1e-15 {
-            for _ in 0..2 {
-                let gram = rotation.transpose() * rotation;
-                rotation *= Matrix3::identity() * 1.5 - gram * 0.5;
-            }
+            rotation = polished(rotation, gram);
+        }
+        if deviation > 1e-9 {
+            rotation = polished(rotation, rotation.transpose() * rotation);
         }
         Ok(Self::new(rotation, translation))
     }

@@ -35,19 +35,22 @@ pub fn camera(py: Python<'_>, lens: &str, parameters: &Array<'_>) -> PyResult<Ca
 /// Features from points `(N, 3)` and radii `(N,)`; an error names the index.
 pub fn features(py: Python<'_>, points: &Array<'_>, radii: &Array<'_>) -> PyResult<Vec<Feature>> {
     let points = convert::rows::<3>(py, "points", points)?;
-    let radii = convert::scalars(py, "radii", radii)?;
+    let radii = convert::entries(py, "radii", radii)?;
     let count = points.len() / 3;
     if count != radii.len() {
         return Err(invalid(py, &format!("{count} points but {} radii", radii.len())));
     }
-    // Collected into a `Result` it would grow step by step.
-    let mut features = Vec::with_capacity(count);
-    for (i, (position, radius)) in points.chunks_exact(3).zip(radii).enumerate() {
-        let feature = Feature::new(Vector3::from_column_slice(position), radius)
-            .map_err(|error| invalid(py, &format!("feature {i}: {error}")))?;
-        features.push(feature);
+    let all = || points.chunks_exact(3).zip(&*radii).map(|(p, r)| (Vector3::new(p[0], p[1], p[2]), *r));
+    // Without a way out in the middle these go many at a time.
+    let finite = points.iter().fold(true, |fine, x| fine & x.is_finite());
+    if finite & radii.iter().fold(true, |fine, r| fine & (0.0..f64::INFINITY).contains(r)) {
+        return Ok(all().map(|(position, radius)| Feature { position, radius }).collect());
     }
-    Ok(features)
+    // One by one, to say which.
+    let one = |(i, (position, radius))| {
+        Feature::new(position, radius).map_err(|error| invalid(py, &format!("feature {i}: {error}")))
+    };
+    all().enumerate().map(one).collect()
 }
 
 #[pyfunction]

@@ -1,7 +1,7 @@
 //! numpy to nalgebra and back, with shape checks that name the argument.
 //!
 //! Everything is copied on the way in, so that the interpreter lock can be released afterwards; only long arrays that
-//! are read once ([`rows`], [`row_major`]) stay where they are.
+//! are read once ([`rows`], [`entries`], [`row_major`]) stay where they are.
 
 use std::borrow::Cow;
 
@@ -44,8 +44,13 @@ pub fn vectors<const D: usize>(
 
 /// Entries of an `(N,)` array.
 pub fn scalars(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Vec<f64>> {
+    Ok(entries(py, name, array)?.into_owned())
+}
+
+/// As [`scalars`], in place where they lie in a row.
+pub fn entries<'a>(py: Python<'_>, name: &str, array: &'a Array<'_>) -> PyResult<Cow<'a, [f64]>> {
     check_shape(py, name, array, &[None])?;
-    Ok(in_place(array).into_owned())
+    Ok(in_place(array))
 }
 
 /// Entries of an `(N, D)` array in row-major order, in place where they lie that way.
@@ -58,7 +63,8 @@ pub fn rows<'a, const D: usize>(
     Ok(in_place(array))
 }
 
-fn in_place<'a>(array: &'a Array<'_>) -> Cow<'a, [f64]> {
+/// Entries in row-major order, in place where they lie that way.
+pub fn in_place<'a>(array: &'a Array<'_>) -> Cow<'a, [f64]> {
     // A slice is given of column-major arrays too.
     match array.as_slice() {
         Ok(entries) if array.is_c_contiguous() => Cow::Borrowed(entries),
@@ -82,12 +88,12 @@ pub fn matrix<const R: usize, const C: usize>(
     array: &Array<'_>,
 ) -> PyResult<SMatrix<f64, R, C>> {
     check_shape(py, name, array, &[Some(R), Some(C)])?;
-    Ok(SMatrix::from_row_iterator(array.as_array().iter().copied()))
+    Ok(SMatrix::from_row_slice(&in_place(array)))
 }
 
 /// One rigid transform out of a `(4, 4)` array.
 pub fn transform(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Se3> {
-    rigid(py, name, &matrix::<4, 4>(py, name, array)?)
+    rigid(py, || name.to_owned(), &matrix::<4, 4>(py, name, array)?)
 }
 
 /// Entries of an `(N, R, C)` array in row-major order, in place where they lie that way.
@@ -105,13 +111,14 @@ pub fn row_major<'a, const R: usize, const C: usize>(
 /// Rigid transforms out of an `(N, 4, 4)` array; an error names the index.
 pub fn transforms(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Vec<Se3>> {
     let matrices = matrices::<4, 4>(py, name, array)?;
-    matrices.iter().enumerate().map(|(i, m)| rigid(py, &format!("{name}[{i}]"), m)).collect()
+    let one = |(i, m)| rigid(py, || format!("{name}[{i}]"), m);
+    matrices.iter().enumerate().map(one).collect()
 }
 
-fn rigid(py: Python<'_>, name: &str, m: &Matrix4<f64>) -> PyResult<Se3> {
+fn rigid(py: Python<'_>, name: impl Fn() -> String, m: &Matrix4<f64>) -> PyResult<Se3> {
     Se3::from_matrix(m).map_err(|error| {
         let error = to_python(py, error);
-        let message = format!("{name} is {}", error.value(py));
+        let message = format!("{} is {}", name(), error.value(py));
         match error.value(py).setattr("args", (message,)) {
             Ok(()) => error,
             Err(broken) => broken,

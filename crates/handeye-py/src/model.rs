@@ -36,7 +36,7 @@ pub fn square(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<DMatrix
     if shape.len() != 2 || shape[0] != shape[1] {
         return Err(invalid(py, &format!("{name} must be a square matrix")));
     }
-    Ok(DMatrix::from_row_iterator(shape[0], shape[1], array.as_array().iter().copied()))
+    Ok(DMatrix::from_row_slice(shape[0], shape[1], &convert::in_place(array)))
 }
 
 fn twist(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<SVector<f64, 6>> {
@@ -128,7 +128,7 @@ pub fn jacobian_list(py: Python<'_>, array: &Array<'_>) -> PyResult<Vec<DMatrix<
     if shape.len() != 3 || shape[1] != 6 {
         return Err(invalid(py, "joint Jacobians must have shape (N, 6, q)"));
     }
-    let values: Vec<f64> = array.as_array().iter().copied().collect();
+    let values = convert::in_place(array);
     let size = 6 * shape[2];
     Ok((0..shape[0])
         .map(|k| DMatrix::from_row_slice(6, shape[2], &values[k * size..(k + 1) * size]))

@@ -36,7 +36,7 @@ fn pool(py: Python<'_>, array: &Array<'_>) -> PyResult<Vec<DMatrix<f64>>> {
     if shape.len() != 3 || shape[1] != shape[2] {
         return Err(invalid(py, "informations must have shape (N, n, n)"));
     }
-    let values: Vec<f64> = array.as_array().iter().copied().collect();
+    let values = convert::in_place(array);
     let size = shape[1] * shape[1];
     Ok((0..shape[0])
         .map(|i| DMatrix::from_row_slice(shape[1], shape[1], &values[i * size..(i + 1) * size]))

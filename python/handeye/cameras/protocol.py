@@ -14,10 +14,14 @@ Grey = NDArray[np.uint8]
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of the target that a camera found by itself: ids (N,) and pixels (N, 2)."""
+    """Points of the target that a camera found by itself: ids (N,) and pixels (N, 2).
+
+    `labels_known` says that the ids are to be taken as they are, also where the target looks the same turned.
+    """
 
     point_ids: IndexArray
     pixels: FloatArray
+    labels_known: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handeye.cameras.pattern import Mask, Pattern, pattern_of
 from handeye.errors import InputError
+from handeye.pattern import Mask, Pattern, pattern_of
 from handeye.types import Camera, Pose, Target
 from handeye.types.arrays import FloatArray
 

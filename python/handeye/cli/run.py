@@ -30,10 +30,11 @@ from handeye.session.configuration import (
     go_on,
     prepare,
 )
-from handeye.session.drivers import Person
+from handeye.session.deciding import START_VIEWS, EndReason
+from handeye.session.drivers import REPLAY, Person
 from handeye.session.entry import Entry
 from handeye.session.faults import FaultRates
-from handeye.session.loop import START_VIEWS, End, EndReason, Session
+from handeye.session.loop import End, Session
 from handeye.session.request import reach
 from handeye.session.simulated import usual_errors
 from handeye.session.starting import preview
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Corner = tuple[float, float, float]
+DEFAULT_ARM = "epson_c4l"
 
 
 @Parameter(name="*", group="Limits of motion and views")
@@ -104,12 +106,12 @@ class Simulated:
 def run(
     *,
     session: Path | None = None,
-    robot: str = "epson_c4l",
+    robot: str | None = None,
     driver: str = SIMULATED,
-    images: str = SIMULATED,
+    images: str | None = None,
     target: Path | None = None,
     camera: Path | None = None,
-    mounting: Mounting = Mounting.EYE_IN_HAND,
+    mounting: Mounting | None = None,
     accuracy_mm: float = 0.5,
     accuracy_deg: float = 0.05,
     max_views: int = 20,
@@ -136,18 +138,19 @@ def run(
     session
         Folder to write; a new one, or with --resume the one to go on with.
     robot
-        Description of the arm: a shipped arm (epson_c4l, ur5e, lbr_iiwa_14) or a URDF file.
+        Description of the arm: a shipped arm (epson_c4l, ur5e, lbr_iiwa_14) or a URDF file. Without one
+        epson_c4l, or in a replay none.
     driver
-        What moves it: simulated, manual (a person; manual:kuka for another notation), replay:FOLDER, or a
-        driver of another package with its address.
+        What moves it: simulated, manual (a person; manual:kuka for another notation), replay:FOLDER (nothing;
+        the views of a recording are the candidates), or a driver of another package with its address.
     images
-        Where pictures come from: simulated, folder:PATH, opencv:0, replay:FOLDER, or another package's.
+        Where pictures come from: folder:PATH, opencv:0, or another package's; simulated and replay need none.
     target
         Target in TOML or JSON; the simulated one is a chessboard.
     camera
         Calibrated camera in TOML, JSON or ROS's camera_info .yaml.
     mounting
-        Where the camera sits.
+        Where the camera sits; in the hand, if nothing is said.
     accuracy_mm
         Radius within which the camera's position shall lie with 95 % probability.
     accuracy_deg
@@ -175,11 +178,24 @@ def run(
         if session is None:
             raise UsageError("--resume needs --session", hint="give the folder of the session to go on with")
         return _resumed(session, person, confirm, as_json=common.json)
+    replays = driver.partition(":")[0] == REPLAY
+    if replays and (camera, target, mounting) != (None, None, None):
+        raise UsageError(
+            "a replay has --camera, --target and --mounting from its recording",
+            hint="handeye import makes a recording with others",
+        )
+    if replays:
+        driver = f"{REPLAY}:{Path(driver.partition(':')[2]).resolve()}"
+        robot = None if robot is None else _described(robot)
+    else:
+        robot = _described(robot or DEFAULT_ARM)
+    if images is None:
+        images = REPLAY if replays else SIMULATED
     configuration = Configuration(
-        robot=_described(robot),
+        robot=robot,
         driver=driver,
         images=images,
-        mounting=mounting,
+        mounting=mounting or Mounting.EYE_IN_HAND,
         accuracy_mm=accuracy_mm,
         accuracy_deg=accuracy_deg,
         most_views=max_views,
@@ -304,13 +320,13 @@ class _Progress:
 
 
 def _plan(prepared: Prepared) -> Answer:
+    space, start, wish = prepared.cell.workspace, prepared.start, prepared.configuration
+    if space is None or start is None:
+        raise UsageError("--dry-run shows motions, and here are none")
     goals = [
         Goal(f"view_{i:02d}.1", pose, tuple(joints.tolist()), prepared.configuration.speed_rad_s)
-        for i, (pose, joints) in enumerate(
-            preview(prepared.start, prepared.arm, prepared.cell.workspace, START_VIEWS), start=1
-        )
+        for i, (pose, joints) in enumerate(preview(start, prepared.arm, space, START_VIEWS), start=1)
     ]
-    space, wish = prepared.cell.workspace, prepared.configuration
     data: dict[str, Any] = {
         "dry_run": True,
         "arm": prepared.arm.name,
@@ -373,6 +389,11 @@ def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end:
         "attempts": end.attempts,
         "within_95": None if end.reach is None else vars(end.reach),
         "true_error": error,
+        "collisions_judged": (
+            "none: recorded views, nothing moved"
+            if configuration.is_replay
+            else "by capsules along the links"
+        ),
         "seed": configuration.seed,
         "calibration": calibration.to_dict(),
     }
@@ -399,7 +420,7 @@ def _show(console: "Console", data: Mapping[str, Any], end: End, error: Mapping[
     heading(console, name)
     pairs(console, pose_lines(calibration.results[name]), indent=2)
     console.print()
-    rows = [("views", f"{end.views} of {end.attempts} attempts")]
+    rows = [("views", f"{end.views} of {end.attempts} attempts"), ("collisions", data["collisions_judged"])]
     if end.reach is not None:
         rows.append(
             (
@@ -411,7 +432,7 @@ def _show(console: "Console", data: Mapping[str, Any], end: End, error: Mapping[
         rows.append(
             (
                 "truth",
-                f"off by {error['translation_mm']:.3f} mm and {error['rotation_deg']:.4f} deg (simulated)",
+                f"off by {error['translation_mm']:.3f} mm and {error['rotation_deg']:.4f} deg",
             )
         )
     rows.append(("written", data["session"]))

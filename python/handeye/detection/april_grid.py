@@ -3,11 +3,18 @@
 import cv2
 import numpy as np
 
-from handeye.detection.base import NOT_HERE, Detection, Image, NotFound, Reason, ordered
-from handeye.detection.corner_fit import CornerKind, fit_corners
+from handeye.detection.base import Detection, Image, NotFound, Reason, inside, ordered
+from handeye.detection.corner_fit import ASTRAY_PX, CornerKind, fit_corners
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.markers import disagreement, find_markers, foreign_markers, from_neighbours
-from handeye.detection.part import Part
+from handeye.detection.markers import (
+    LEAST_SHARE,
+    disagreement,
+    find_markers,
+    foreign_markers,
+    from_neighbours,
+    readable,
+)
+from handeye.detection.registration import Aligned, Lens
 from handeye.types import AprilGrid
 from handeye.types.arrays import FloatArray, IndexArray
 
@@ -16,20 +23,18 @@ _OPENCV_CORNERS = [1, 0, 3, 2]
 # Part of the space between tags that the window of a corner may take, and of the border that its strips may.
 WINDOW_SHARE = 0.8
 BAND_SHARE = 0.8
-# Corners further from where the tags around put them are not what they seem.
-ASTRAY_PX = 1.5
+# Sides of a tag that begin at its corners: to the next corner, and to the one before.
+_SIDES = np.array([[[1, 0], [0, -1]], [[0, -1], [-1, 0]], [[-1, 0], [0, 1]], [[0, 1], [1, 0]]], dtype=float)
+# Tags read where they are expected.
+FEWEST_TAGS = 2
 # Tried until all tags are found; one leaves the ink as it is.
 THINNING_PX = (3, 1, 5)
 
 
-def find(image: Image, target: AprilGrid, part: Part | None = None) -> Detection | NotFound:
-    """Find the corners of the tags that are visible; with a part of the image, by one quick attempt there."""
-    here = part or Part.whole(image)
-    ids, seen = _tags(here.picture, target)
-    seen = here.places(seen)
+def find(image: Image, target: AprilGrid) -> Detection | NotFound:
+    """Find the corners of the tags that are visible."""
+    ids, seen = _tags(image, target)
     known = ids < target.rows * target.columns
-    if part is not None and not known.any():
-        return NOT_HERE
     if not known.any():
         other = foreign_markers(image, target.dictionary, target.border_bits)
         if other is None and len(find_markers(image, target.dictionary, 3 - target.border_bits)[0]):
@@ -53,13 +58,38 @@ def find(image: Image, target: AprilGrid, part: Part | None = None) -> Detection
     expected = from_neighbours(plane, seen.reshape(-1, 2))
     astray = np.linalg.norm(expected - seen.reshape(-1, 2), axis=1) > ASTRAY_PX
     seen = np.where(astray[:, np.newaxis], expected, seen.reshape(-1, 2)).reshape(-1, 4, 2)
-    sharp = _measured(image, target, seen)
-    good = np.flatnonzero(np.isfinite(sharp[:, 0]))
+    rough = _measured(image, target, seen, None)
+    good = np.flatnonzero(np.isfinite(rough[:, 0]))
+    lens = Lens.fitted(plane[good], rough[good]) if len(good) >= 4 else None
+    if lens is None:
+        return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
+    # Once more: all corners together tell the directions of edges better than a tag does.
+    again = np.where(np.isfinite(rough), rough, seen.reshape(-1, 2)).reshape(-1, 4, 2)
+    sharp = _measured(image, target, again, lens.steps(plane, 0.1 * target.tag_m))
+    good = np.flatnonzero(np.isfinite(rough[:, 0]) & np.isfinite(sharp[:, 0]))
     expected = from_neighbours(plane[good], sharp[good])
     good = good[np.linalg.norm(expected - sharp[good], axis=1) <= ASTRAY_PX]
     if len(good) < 4:
         return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
     return ordered(target, points.ravel()[good], sharp[good])
+
+
+def confirm(image: Image, target: AprilGrid, board: Aligned) -> Detection | None:
+    """Return the corners of a grid that was found where it was expected; None unless it is that one."""
+    plane = target.points[:, :2]
+    outlines = plane.reshape(-1, 4, 2)
+    places = board.places(outlines)
+    expected = inside(image, places.reshape(-1, 2)).reshape(-1, 4).all(axis=1)
+    read = expected & readable(board, outlines, target.dictionary, target.border_bits)
+    if read.sum() < max(FEWEST_TAGS, LEAST_SHARE * expected.sum()):
+        return None
+    ids = (4 * np.flatnonzero(read)[:, np.newaxis] + np.arange(4)).ravel()
+    corners = places[read].reshape(-1, 2)
+    sharp = _measured(image, target, places[read], board.steps(plane[ids]), settle=True)
+    good = np.linalg.norm(sharp - corners, axis=1) <= ASTRAY_PX
+    if good.sum() < max(4, LEAST_SHARE * 4 * expected.sum()):
+        return None
+    return ordered(target, ids[good], sharp[good])
 
 
 def _tags(image: Image, target: AprilGrid) -> tuple[IndexArray, FloatArray]:
@@ -86,12 +116,20 @@ def _tags(image: Image, target: AprilGrid) -> tuple[IndexArray, FloatArray]:
     return ids, seen
 
 
-def _measured(image: Image, target: AprilGrid, tags: FloatArray) -> FloatArray:
-    """Return the corners (4 M, 2) of tags (M, 4, 2) as fitted, NaN where that fails."""
+def _measured(
+    image: Image, target: AprilGrid, tags: FloatArray, steps: FloatArray | None, settle: bool = False
+) -> FloatArray:
+    """Return the corners (4 M, 2) of tags (M, 4, 2) as fitted, NaN where that fails.
+
+    The directions of the edges are those of the outlines, or, if it is known, those that the pixels
+    (4 M, 2, 2) per metre along both axes tell.
+    """
     after = np.roll(tags, -1, axis=1) - tags
     before = np.roll(tags, 1, axis=1) - tags
     lengths = np.minimum(np.linalg.norm(after, axis=2), np.linalg.norm(before, axis=2)).reshape(-1)
     directions = np.stack([after, before], axis=2).reshape(-1, 2, 2)
+    if steps is not None:
+        directions = np.tile(_SIDES, (len(tags), 1, 1)) @ steps
     directions = directions / np.linalg.norm(directions, axis=2, keepdims=True)
     height = lengths * np.abs(np.linalg.det(directions))
     bits = {"16h5": 4, "25h9": 5}.get(target.dictionary.rsplit("_", 1)[-1], 6)
@@ -103,4 +141,5 @@ def _measured(image: Image, target: AprilGrid, tags: FloatArray) -> FloatArray:
         WINDOW_SHARE * target.spacing_ratio * height,
         CornerKind.QUADRANTS,
         bands=BAND_SHARE * min(border, target.spacing_ratio) * height,
+        settle=settle,
     )

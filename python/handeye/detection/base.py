@@ -105,10 +105,6 @@ class NotFound:
         return DetectionError(f"{name}: target not found: {self.evidence}", code=self.reason, hint=self.hint)
 
 
-# Where only a part of the image was looked at, nobody asks why.
-NOT_HERE = NotFound(Reason.NO_PATTERN, "not in this part of the image")
-
-
 def relabeled(detection: Detection, permutation: IndexArray) -> Detection:
     """Return the detection with point i called `permutation[i]`, as the symmetries of a target have it."""
     return Detection(permutation[detection.point_ids], detection.pixels)
@@ -141,8 +137,19 @@ def affine(source: FloatArray, destination: FloatArray) -> tuple[FloatArray, Flo
     centre = source.mean(axis=0)
     shift = destination.mean(axis=0)
     flat = source - centre
-    A = np.asarray(np.linalg.pinv(flat) @ (destination - shift), dtype=np.float64)
+    (a, b), (_, d) = square = flat.T @ flat
+    determinant = a * d - b * b
+    # Points on a line leave the rest open; then the least of all answers is taken.
+    degenerate = determinant <= 1e-12 * (a + d) ** 2
+    inverse = np.linalg.pinv(square) if degenerate else np.array([[d, -b], [-b, a]]) / determinant
+    A = np.asarray(inverse @ (flat.T @ (destination - shift)), dtype=np.float64)
     return A, shift - centre @ A
+
+
+def inside(image: Image, pixels: FloatArray) -> NDArray[np.bool_]:
+    """Tell which places (N, 2) are in an image."""
+    last = np.array(image.shape[::-1]) - 1.0
+    return np.asarray(((pixels >= 0) & (pixels <= last)).all(axis=1), dtype=np.bool_)
 
 
 def is_mirrored(plane: FloatArray, pixels: FloatArray) -> bool:

@@ -56,7 +56,8 @@ class Spots:
 
 def areas(shapes: FloatArray) -> FloatArray:
     """Return the areas (N,) of ellipses of shapes (N, 2, 2)."""
-    return np.pi * np.sqrt(np.linalg.det(shapes))
+    determinants = shapes[:, 0, 0] * shapes[:, 1, 1] - shapes[:, 0, 1] * shapes[:, 1, 0]
+    return np.asarray(np.pi * np.sqrt(np.maximum(determinants, 0)), dtype=np.float64)
 
 
 def find_spots(image: Image) -> tuple[Spots, Spots]:

@@ -1,42 +1,59 @@
 """Inner corners of a ChArUco board, each known by the markers beside it."""
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 
 from handeye.detection.base import (
-    NOT_HERE,
     Detection,
     Image,
     NotFound,
     Reason,
+    inside,
     ordered,
 )
-from handeye.detection.corner_fit import CornerKind, fit_corners
+from handeye.detection.corner_fit import ASTRAY_PX, CornerKind, fit_corners
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.markers import dictionary, disagreement, foreign_markers, parameters, unique
-from handeye.detection.part import Part
+from handeye.detection.markers import (
+    LEAST_SHARE,
+    dictionary,
+    disagreement,
+    foreign_markers,
+    parameters,
+    readable,
+    unique,
+)
+from handeye.detection.registration import LEAST_LIKENESS, Aligned, Lens
 from handeye.types import Charuco
 from handeye.types.arrays import FloatArray
 
 FEWEST_CORNERS = 4
+# Markers read where they are expected.
+FEWEST_MARKERS = 2
 # Part of a square that the window of a corner may take, and of the way to a marker that its strips may.
 WINDOW_SHARE = 0.7
 BAND_SHARE = 0.8
 
 
-def find(image: Image, target: Charuco, part: Part | None = None) -> Detection | NotFound:
-    """Find the corners that are visible, at least four; with a part of the image, by one attempt there."""
+@lru_cache(maxsize=16)
+def _board(target: Charuco) -> tuple[cv2.aruco.CharucoBoard, FloatArray]:
+    """Return OpenCV's board, and the corners (M, 4, 2) of its markers in the plane of the target."""
     board = cv2.aruco.CharucoBoard(
         (target.columns, target.rows), target.square_m, target.marker_m, dictionary(target.dictionary)
     )
     board.setLegacyPattern(target.legacy_pattern)
-    here = part or Part.whole(image)
+    # OpenCV counts from the outer corner.
+    return board, np.asarray(board.getObjPoints(), dtype=np.float64)[:, :, :2] - target.square_m
+
+
+def find(image: Image, target: Charuco) -> Detection | NotFound:
+    """Find the corners that are visible, at least four."""
+    board, places = _board(target)
     detector = cv2.aruco.CharucoDetector(board, cv2.aruco.CharucoParameters(), parameters(1))
-    found, found_ids, marker_corners, marker_ids = detector.detectBoard(here.picture)
+    found, found_ids, marker_corners, marker_ids = detector.detectBoard(image)
     ids, seen = unique(marker_ids, marker_corners)
-    seen = here.places(seen)
     on_board = np.asarray(board.getIds()).ravel()
-    places = np.asarray(board.getObjPoints(), dtype=np.float64)[:, :, :2]
     known = np.isin(ids, on_board)
     against = disagreement(places[ids[known]], seen[known])
     if against is not None:
@@ -46,36 +63,72 @@ def find(image: Image, target: Charuco, part: Part | None = None) -> Detection |
             Reason.INCONSISTENT,
             f"{(~known).sum()} of {len(ids)} markers have numbers that the board described does not have",
         )
-    if part is not None and not known.any():
-        return NOT_HERE
     if not known.any():
         other = foreign_markers(image, target.dictionary, 1)
         return other or diagnose(image, NotFound(Reason.NO_PATTERN, f"no marker of {target.dictionary}"))
     # OpenCV gives None where it finds nothing, whatever its types say.
     number = 0 if found_ids is None else len(found_ids)  # pyright: ignore[reportUnnecessaryComparison]
     if number >= FEWEST_CORNERS:
-        corners = here.places(np.asarray(found, dtype=np.float64).reshape(-1, 2))
-        sharp = _measured(image, target, corners, places[ids[known]], seen[known])
-        good = np.isfinite(sharp).all(axis=1)
+        corners = np.asarray(found, dtype=np.float64).reshape(-1, 2)
+        numbers = np.asarray(found_ids, dtype=np.int64).ravel()
+        rough = _measured(image, target, corners, _steps(corners, places[ids[known]], seen[known]))
+        good = np.isfinite(rough).all(axis=1)
+        numbers, rough = numbers[good], rough[good]
+        # Once more: all corners together tell the directions of edges better than a marker does.
+        plane = target.points[numbers, :2]
+        lens = Lens.fitted(plane, rough) if len(rough) >= FEWEST_CORNERS else None
+        if lens is not None:
+            rough = _measured(image, target, rough, lens.steps(plane, 0.1 * target.square_m))
+        good = np.isfinite(rough).all(axis=1)
         number = int(good.sum())
         if number >= FEWEST_CORNERS:
-            return ordered(target, np.asarray(found_ids).ravel()[good], sharp[good])
+            return ordered(target, numbers[good], rough[good])
     return NotFound(
         Reason.INCOMPLETE,
         f"{number} of {target.point_count} corners by {known.sum()} markers; {FEWEST_CORNERS} are needed",
     )
 
 
-def _measured(
-    image: Image, target: Charuco, corners: FloatArray, places: FloatArray, markers: FloatArray
-) -> FloatArray:
-    """Return the corners (N, 2) as fitted, NaN where that fails; the nearest marker tells the directions."""
+def confirm(image: Image, target: Charuco, board: Aligned) -> Detection | None:
+    """Return the corners of a board that was found where it was expected; None unless it is that one."""
+    _, outlines = _board(target)
+    markers = board.places(outlines)
+    expected = inside(image, markers.reshape(-1, 2)).reshape(-1, 4).all(axis=1)
+    read = expected & readable(board, outlines, target.dictionary, 1)
+    if read.sum() < max(FEWEST_MARKERS, LEAST_SHARE * expected.sum()):
+        return None
+    plane = target.points[:, :2]
+    corners = board.places(plane)
+    away = np.linalg.norm(plane[:, np.newaxis] - outlines[read].mean(axis=1), axis=2)
+    known = away.min(axis=1) < target.square_m
+    seen = inside(image, corners)
+    ids = np.flatnonzero(known & seen & (board.likeness(plane) >= LEAST_LIKENESS))
+    if len(ids) < FEWEST_CORNERS:
+        return None
+    sharp = _measured(image, target, corners[ids], board.steps(plane[ids]), settle=True)
+    good = np.linalg.norm(sharp - corners[ids], axis=1) <= ASTRAY_PX
+    if good.sum() < max(FEWEST_CORNERS, LEAST_SHARE * seen.sum()):
+        return None
+    return ordered(target, ids[good], sharp[good])
+
+
+def _steps(corners: FloatArray, places: FloatArray, markers: FloatArray) -> FloatArray:
+    """Return the pixels (N, 2, 2) per metre along both axes at corners (N, 2), as the nearest marker tells.
+
+    Markers (M, 4, 2) are at places (M, 4, 2) of the board.
+    """
     centres = markers.mean(axis=1)
     nearest = np.argmin(np.linalg.norm(corners[:, np.newaxis] - centres, axis=2), axis=1)
     # The affine map of each marker's own corners, least squares.
     flat = places - places.mean(axis=1, keepdims=True)
     inverse = np.asarray(np.linalg.pinv(flat), dtype=np.float64)
-    steps = (inverse @ (markers - centres[:, np.newaxis]))[nearest]
+    return (inverse @ (markers - centres[:, np.newaxis]))[nearest]
+
+
+def _measured(
+    image: Image, target: Charuco, corners: FloatArray, steps: FloatArray, settle: bool = False
+) -> FloatArray:
+    """Return the corners (N, 2) as fitted, NaN where that fails."""
     lengths = np.linalg.norm(steps, axis=2)
     directions = steps / lengths[:, :, np.newaxis]
     sine = np.abs(np.linalg.det(directions))
@@ -88,4 +141,5 @@ def _measured(
         WINDOW_SHARE * target.square_m * scale,
         CornerKind.CROSSING,
         bands=BAND_SHARE * free * scale,
+        settle=settle,
     )

@@ -11,7 +11,6 @@ import numpy as np
 from cv2.typing import MatLike
 
 from handeye.detection.base import (
-    NOT_HERE,
     Detection,
     Image,
     NotFound,
@@ -19,9 +18,11 @@ from handeye.detection.base import (
     is_mirrored,
     ordered,
 )
-from handeye.detection.corner_fit import CornerKind, fit_corners
+from handeye.detection.beyond import goes_on
+from handeye.detection.corner_fit import ASTRAY_PX, CornerKind, fit_corners
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.part import Part
+from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import Chessboard
 from handeye.types.arrays import FloatArray
 
@@ -31,17 +32,35 @@ SEARCH_SIDE_PX = 2000
 WINDOW_SHARE = 0.8
 
 
-def find(image: Image, target: Chessboard, part: Part | None = None) -> Detection | NotFound:
-    """Find all inner corners of a chessboard; with a part of the image, by one quick attempt there.
+def find(image: Image, target: Chessboard) -> Detection | NotFound:
+    """Find all inner corners of a chessboard.
 
     Point 0 is chosen so that the square between the first corners of the first two rows is dark, if the board
     can be turned so: the board stands as it is usually drawn, with a dark square at the upper left. (OpenCV's
     `findChessboardCornersSB` begins at the light one.)
     """
-    coarse = _search(image, target) if part is None else _within(part, target)
+    coarse = _search(image, target)
     if coarse is None:
-        return _explain(image, target) if part is None else NOT_HERE
-    corners = _labeled(image, target, coarse)
+        return _explain(image, target)
+    corners, _ = _measured(image, target, _labeled(image, target, coarse))
+    return ordered(target, np.arange(target.point_count), corners)
+
+
+def confirm(image: Image, target: Chessboard, board: Aligned) -> Detection | None:
+    """Return the corners of a chessboard that was found where it was expected, None unless all are there."""
+    plane = target.points[:, :2]
+    if board.likeness(plane).min() < LEAST_LIKENESS or goes_on(target, board):
+        return None
+    places = board.places(plane)
+    corners, complete = _measured(image, target, places)
+    if not complete or np.abs(corners - places).max() > ASTRAY_PX:
+        return None
+    return ordered(target, np.arange(target.point_count), corners)
+
+
+def _measured(image: Image, target: Chessboard, corners: FloatArray) -> tuple[FloatArray, bool]:
+    """Return corners (P, 2) from first guesses, and whether all of them could be fitted."""
+    complete = True
     # Twice: what the corners found tell about their edges is better than what those of the search told.
     for _ in range(2):
         edges = _edges(target, corners)
@@ -52,11 +71,12 @@ def find(image: Image, target: Chessboard, part: Part | None = None) -> Detectio
             WINDOW_SHARE * edges.heights,
             CornerKind.CROSSING,
             edges.curvatures,
-            passes=1,
         )
+        good = np.isfinite(fitted)
+        complete = complete and bool(good.all())
         # Where glare or a shadow's edge spoils the picture, what the search found is still the corner.
-        corners = np.where(np.isfinite(fitted), fitted, corners)
-    return ordered(target, np.arange(target.point_count), corners)
+        corners = np.where(good, fitted, corners)
+    return corners, complete
 
 
 def _search(image: Image, target: Chessboard) -> FloatArray | None:

@@ -5,13 +5,16 @@ area centroid of each circle is measured from grey values. The solver predicts a
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
-from handeye.detection.base import NOT_HERE, Detection, Image, NotFound, Reason, ordered
+from handeye.detection.base import Detection, Image, NotFound, Reason, ordered
+from handeye.detection.beyond import goes_on
 from handeye.detection.blobs import Spots, areas, find_spots
 from handeye.detection.centroid import area_centroids
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.lattice import Placement, grow, placements
 from handeye.detection.part import Part
+from handeye.detection.registration import LEAST_LIKENESS, Aligned, Lens
 from handeye.types import CircleGrid
 from handeye.types.arrays import FloatArray, IndexArray
 
@@ -24,30 +27,105 @@ LARGER_SHARE = 0.7
 # might be laid one line off.
 LEAST_SHARE = 0.8
 LEAST_LINE_SHARE = 0.6
+# Circles of a smaller radius are measured twice, if there are enough.
+SMALL_PX, FEWEST_TOGETHER = 8.0, 8
+# How much larger a marked circle of unknown size is guessed to be.
+LARGER = 1.5
+# A circle further from where it was expected, as a share of the root of its area, or of another size, is
+# something else.
+ASTRAY_SHARE, AREA_RATIO = 0.3, 1.5
 
 
-def find(image: Image, target: CircleGrid, part: Part | None = None) -> Detection | NotFound:
-    """Find the circles of a grid; a few that are hidden or cut by the image's edge are left out.
-
-    With a part of the image, by one quick attempt there.
-    """
+def find(image: Image, target: CircleGrid) -> Detection | NotFound:
+    """Find the circles of a grid; a few that are hidden or cut by the image's edge are left out."""
     grid = _places(target)
     seen = 0
-    parts = (Part.whole(image, scale) for scale in _scales(image)) if part is None else [part]
-    for here in parts:
+    for here in (Part.whole(image, scale) for scale in _scales(image)):
         placed, spots = _best(here.picture, grid)
         placed = [p for p in placed if p.found == placed[0].found]
         seen = placed[0].found if placed else 0
-        if placed and _is_certain(target, placed[0]):
+        if placed and _is_certain(target, placed[0].spots >= 0):
             full = Spots(here.places(spots.centres), here.shapes(spots.centres, spots.shapes))
             return _measured(image, target, full, placed)
-    if part is not None:
-        return NOT_HERE
     if seen > 0.5 * target.point_count:
         return NotFound(Reason.INCOMPLETE, f"{seen} of {target.point_count} circles found")
     return diagnose(
         image, NotFound(Reason.NO_PATTERN, f"no grid of {target.columns} x {target.rows} circles")
     )
+
+
+def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | None:
+    """Return the circles of a grid that was found where it was expected; None unless it is that one."""
+    there = board.likeness(target.points[:, :2]) >= LEAST_LIKENESS
+    unknown = target.marked if target.marked_diameter_m is None else None
+    if unknown is not None:
+        there[unknown] = True
+    if not _is_certain(target, there) or goes_on(target, board):
+        return None
+    ids = np.flatnonzero(there)
+    expected = _expected(target, board, ids)
+    if unknown is not None:
+        _measure_first(image, expected, int(np.flatnonzero(ids == unknown)[0]))
+    found = _centroids(image, expected, target.points[ids, :2])
+    moved = np.linalg.norm(found.centres - expected.centres, axis=1)
+    ratio = np.abs(np.log(found.areas / expected.areas))
+    good = (moved <= ASTRAY_SHARE * np.sqrt(expected.areas)) & (ratio < np.log(AREA_RATIO))
+    there[ids] = good
+    if not _is_certain(target, there):
+        return None
+    if target.marked is not None:
+        spots = np.full(target.point_count, -1)
+        spots[ids[good]] = np.flatnonzero(good)
+        if _marked_ratio(target, spots, found.shapes) < MARKED_RATIO:
+            return None
+    return ordered(target, ids[good], found.centres[good])
+
+
+def _measure_first(image: Image, expected: Spots, which: int) -> None:
+    """Put the shape of a circle of unknown size where it is expected; its neighbours depend on it, too."""
+    spot, gap = expected.take(np.array([which])), _gaps(expected)[[which]]
+    spot.shapes[:] *= LARGER**2
+    for _ in range(2):
+        spot = area_centroids(image, spot, gap)
+        if not np.isfinite(spot.centres).all():
+            return
+    expected.shapes[which] = spot.shapes[0]
+
+
+def _centroids(image: Image, circles: Spots, plane: FloatArray) -> Spots:
+    """Return circles at places of the board as measured from first guesses, NaN where they cannot be.
+
+    Of small ones each pixel counts: they are measured once more from where all together put them, so that the
+    first guesses do not matter.
+    """
+    found = area_centroids(image, circles, _gaps(circles))
+    good = np.flatnonzero(np.isfinite(found.centres[:, 0]))
+    if len(good) < FEWEST_TOGETHER or np.median(found.areas[good]) > np.pi * SMALL_PX**2:
+        return found
+    lens = Lens.fitted(plane[good], found.centres[good])
+    if lens is None:
+        return found
+    # A circle of one metre, then of the size that it has.
+    outlines = _outlines(lens.pixels(plane[good]), lens.steps(plane[good], 1e-3 * np.ptp(plane)))
+    sizes = found.areas[good] / outlines.areas
+    usual = float(np.median(sizes))
+    sizes = np.where(np.abs(np.log(sizes / usual)) < np.log(AREA_RATIO), usual, sizes)
+    again = Spots(outlines.centres, outlines.shapes * sizes[:, np.newaxis, np.newaxis])
+    again = area_centroids(image, again, _gaps(again))
+    found.centres[good], found.shapes[good] = again.centres, again.shapes
+    return found
+
+
+def _expected(target: CircleGrid, board: Aligned, ids: IndexArray) -> Spots:
+    """Return the outlines that circles should have."""
+    plane = target.points[ids, :2]
+    steps = board.steps(plane) * target.radii_m[ids, np.newaxis, np.newaxis]
+    return _outlines(board.places(plane), steps)
+
+
+def _outlines(centres: FloatArray, axes: FloatArray) -> Spots:
+    """Return ellipses at centres (N, 2) that are images of circles with radii (N, 2, 2) along both axes."""
+    return Spots(centres, axes.swapaxes(1, 2) @ axes)
 
 
 def _scales(image: Image) -> list[float]:
@@ -81,9 +159,8 @@ def _best(image: Image, grid: IndexArray) -> tuple[list[Placement], Spots]:
     return best
 
 
-def _is_certain(target: CircleGrid, placement: Placement) -> bool:
-    """Tell whether so many circles are there that the grid cannot lie one line further."""
-    there = placement.spots >= 0
+def _is_certain(target: CircleGrid, there: NDArray[np.bool_]) -> bool:
+    """Tell whether so many of the circles (P,) are there that the grid cannot lie one line further."""
     x, y = target.points[:, 0], target.points[:, 1]
     near = target.pitch_m / 2
     lines = (x < x.min() + near, x > x.max() - near, y < y.min() + near, y > y.max() - near)
@@ -103,7 +180,9 @@ def _measured(
     pixels = np.full((len(spots), 2), np.nan)
     shapes = spots.shapes.copy()
     circles = spots.take(used)
-    measured = area_centroids(image, circles, _gaps(circles))
+    # All placements use the same spots: the first one says where they are on the board.
+    plane = target.points[np.flatnonzero(placed[0].spots >= 0), :2]
+    measured = _centroids(image, circles, plane)
     pixels[used] = measured.centres
     good = np.isfinite(pixels[:, 0])
     shapes[used] = np.where(good[used, np.newaxis, np.newaxis], measured.shapes, circles.shapes)

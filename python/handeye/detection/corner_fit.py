@@ -10,6 +10,7 @@ from enum import Enum
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from handeye import _core
 from handeye.detection.base import Image
@@ -21,6 +22,11 @@ LARGEST_RADIUS_PX = 30.0
 SMOOTHING_PX = 1.0
 # Half the width of the strip along each edge that is looked at.
 BAND_PX = 4.0
+# Corners further than this from where others put them are not what they seem.
+ASTRAY_PX = 1.5
+# A window is where it belongs if its corner is so near to its middle, per squared half width of the strips:
+# the wider they are, the less it matters.
+SETTLED = 0.008
 # Pixels around the corners that windows and smoothing may reach.
 _REACH_PX = round(LARGEST_RADIUS_PX) + 7
 
@@ -42,7 +48,7 @@ def fit_corners(
     kind: CornerKind,
     curvatures: FloatArray | None = None,
     bands: FloatArray | None = None,
-    passes: int = 2,
+    settle: bool = False,
 ) -> FloatArray:
     """Return corners (N, 2), NaN where the fit fails.
 
@@ -61,8 +67,9 @@ def fit_corners(
         edges. None for straight ones.
     bands
         (N,) distance from the edges, in pixels, beyond which there is something else; None for nothing.
-    passes
-        How often; each lays the window where the last one found the corner, so that the guess matters little.
+    settle
+        Whether windows in which the corner was not in the middle are laid anew around it, so that the guess
+        matters little.
     """
     finite = np.isfinite(corners).all(axis=1)
     if not finite.any():
@@ -72,15 +79,24 @@ def fit_corners(
     high = np.clip(np.ceil(corners[finite].max(axis=0)) + _REACH_PX + 1, low + 1, size).astype(int)
     part = image[low[1] : high[1], low[0] : high[0]].astype(np.float32)
     smooth = np.asarray(cv2.GaussianBlur(part, (0, 0), SMOOTHING_PX), dtype=np.float32)
-    found = _core.fit_corners(
-        smooth,
-        corners - low,
-        directions,
-        np.zeros((len(corners), 2)) if curvatures is None else curvatures,
-        radii,
-        np.full(len(corners), BAND_PX) if bands is None else bands,
-        kind is CornerKind.CROSSING,
-        SMOOTHING_PX,
-        passes,
-    )
+    bends = np.zeros((len(corners), 2)) if curvatures is None else curvatures
+    strips = np.full(len(corners), BAND_PX) if bands is None else bands
+
+    def fitted(guesses: FloatArray, which: NDArray[np.bool_]) -> FloatArray:
+        return _core.fit_corners(
+            smooth,
+            guesses[which],
+            directions[which],
+            bends[which],
+            radii[which],
+            strips[which],
+            kind is CornerKind.CROSSING,
+            SMOOTHING_PX,
+            1,
+        )
+
+    found = fitted(corners - low, np.ones(len(corners), dtype=np.bool_))
+    if settle:
+        again = np.linalg.norm(found + low - corners, axis=1) > SETTLED * strips * strips
+        found[again] = fitted(found, again)
     return found + low

@@ -8,28 +8,34 @@ import numpy as np
 
 from handeye.detection import april_grid, charuco, chessboard, circle_grid
 from handeye.detection.base import Detection, Image, NotFound, Reason
-from handeye.detection.part import Part
-from handeye.detection.predicted import Prediction, expected_part, is_whole
+from handeye.detection.predicted import Prediction, where_expected
+from handeye.detection.registration import Aligned
 from handeye.errors import InputError
 from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid, Target
 
 SMALLEST_SIDE_PX = 24
 # To be raised with every change of what is detected, or where.
-VERSION = 2
+VERSION = 3
 
-_FINDERS: dict[type[Target], Callable[[Image, Any, Part | None], Detection | NotFound]] = {
+_FINDERS: dict[type[Target], Callable[[Image, Any], Detection | NotFound]] = {
     Chessboard: chessboard.find,
     CircleGrid: circle_grid.find,
     Charuco: charuco.find,
     AprilGrid: april_grid.find,
+}
+_CONFIRMERS: dict[type[Target], Callable[[Image, Any, Aligned], Detection | None]] = {
+    Chessboard: chessboard.confirm,
+    CircleGrid: circle_grid.confirm,
+    Charuco: charuco.confirm,
+    AprilGrid: april_grid.confirm,
 }
 
 
 def detect(image: Image, target: Target, *, predicted: Prediction | None = None) -> Detection | NotFound:
     """Find the points of a target in a grey image.
 
-    With a prediction the part of the image where the target should be is looked at first, and the whole image
-    only if the target is not there, or may be only in part.
+    With a prediction the target is looked for where it should be first, and in the whole image only if it is
+    not there or if what is there may not be it.
 
     Parameters
     ----------
@@ -66,30 +72,20 @@ def detect(image: Image, target: Target, *, predicted: Prediction | None = None)
         return NotFound(Reason.IMAGE_TOO_SMALL, f"the image has only {width} x {height} pixels")
     whole = np.ascontiguousarray(image)
     if predicted is not None:
-        found = _where_predicted(whole, target, predicted, finder)
+        found = _where_predicted(whole, target, predicted)
         if found is not None:
             return found
     try:
-        return finder(whole, target, None)
+        return finder(whole, target)
     except cv2.error as error:
         # OpenCV asserts on some contents; to the caller that is one image without a target, not a crash.
         return NotFound(Reason.DETECTOR_FAILED, f"OpenCV: {str(error).strip()[:200]}")
 
 
-def _where_predicted(
-    image: Image,
-    target: Target,
-    predicted: Prediction,
-    finder: Callable[[Image, Any, Part | None], Detection | NotFound],
-) -> Detection | None:
+def _where_predicted(image: Image, target: Target, predicted: Prediction) -> Detection | None:
     """Return what is found where it is expected, None if the whole image is to be looked at."""
-    part = expected_part(image, target, predicted, SMALLEST_SIDE_PX)
-    if part is None:
-        return None
     try:
-        found = finder(image, target, part)
+        board = where_expected(image, target, predicted)
+        return None if board is None else _CONFIRMERS[type(target)](image, target, board)
     except cv2.error:
         return None
-    if isinstance(found, NotFound) or not is_whole(image, part, target, predicted, found):
-        return None
-    return found

@@ -4,8 +4,11 @@ from functools import cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from handeye.detection.base import Image, NotFound, Reason
+from handeye.detection.beyond import correlation
+from handeye.detection.registration import Aligned
 from handeye.types.arrays import FloatArray, IndexArray
 
 # Smallest perimeter of a marker, as a share of the longer side of the image.
@@ -17,6 +20,12 @@ NEIGHBOURS = 12
 # Corners are weighed anew so many times; those closer than this to where they should be all count the same.
 WEIGHINGS = 5
 FINEST_PX = 0.05
+# A marker has its number where its bits agree so well with those printed; those of other numbers differ in a
+# quarter of the bits or more.
+LEAST_AGREEMENT = 0.75
+LEAST_CONTRAST = 5.0
+# Of the markers that should be in the image so many must be readable.
+LEAST_SHARE = 0.5
 # One of each kind; smaller dictionaries are beginnings of these.
 _LARGEST = (
     "DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL",
@@ -53,6 +62,28 @@ def unique(ids: object, corners: object) -> tuple[IndexArray, FloatArray]:
     values, counts = np.unique(numbers, return_counts=True)
     once = np.isin(numbers, values[counts == 1])
     return numbers[once], places[once]
+
+
+def readable(board: Aligned, outlines: FloatArray, name: str, border_bits: int) -> NDArray[np.bool_]:
+    """Tell which markers (M,) show their numbers where they should be.
+
+    Parameters
+    ----------
+    board
+        Where the board seems to be.
+    outlines
+        (M, 4, 2) corners of the markers in the plane of the board, all round.
+    name, border_bits
+        Of the markers.
+    """
+    bits = dictionary(name).markerSize
+    steps = (border_bits + np.arange(bits) + 0.5) / (bits + 2 * border_bits)
+    first = outlines[:, np.newaxis, np.newaxis, 0]
+    across, down = (outlines[:, np.newaxis, np.newaxis, k] - first for k in (1, 3))
+    places = first + across * steps[:, np.newaxis] + down * steps[:, np.newaxis, np.newaxis]
+    seen = board.seen(places)
+    agreement = correlation(seen, board.drawn(places))
+    return (agreement >= LEAST_AGREEMENT) & (seen.std(axis=(1, 2)) >= LEAST_CONTRAST)
 
 
 def disagreement(plane: FloatArray, pixels: FloatArray) -> NotFound | None:

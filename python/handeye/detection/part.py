@@ -1,4 +1,4 @@
-"""The picture in which a target is searched, and where that is in the image in which it is measured."""
+"""A reduced picture in which a target is searched, and where that is in the image in which it is measured."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from handeye.types.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part of an image, or all of it, of another size or seen from another side.
+    """An image of another size.
 
     Attributes
     ----------
@@ -19,13 +19,10 @@ class Part:
         (H, W) what to search.
     to_image
         (3, 3) homography from its pixels to those of the image.
-    side_px
-        So near to the sides of the picture a target may be cut.
     """
 
     picture: Image
     to_image: FloatArray
-    side_px: float = 0.0
 
     @classmethod
     def whole(cls, image: Image, scale: float = 1.0) -> "Part":
@@ -37,10 +34,6 @@ class Part:
     def places(self, pixels: FloatArray) -> FloatArray:
         """Return places (..., 2) of the picture in pixels of the image."""
         return mapped(self.to_image, pixels)
-
-    def inverse(self, pixels: FloatArray) -> FloatArray:
-        """Return pixels (..., 2) of the image in the picture."""
-        return mapped(np.asarray(np.linalg.inv(self.to_image), dtype=np.float64), pixels)
 
     def shapes(self, centres: FloatArray, shapes: FloatArray) -> FloatArray:
         """Return shapes (N, 2, 2) of spots at centres (N, 2) of the picture as they are in the image."""
@@ -66,5 +59,6 @@ def reduced(image: Image, scale: float) -> tuple[Image, FloatArray]:
     """Return a smaller image, and the factors (2,) from its size to that of the image."""
     if scale >= 1:
         return image, np.ones(2)
-    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    return np.asarray(small, dtype=np.uint8), np.array(image.shape[::-1]) / small.shape[::-1]
+    size = np.maximum(np.rint(np.array(image.shape[::-1]) * scale), 1).astype(int)
+    small = cv2.resize(image, size.tolist(), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.uint8), np.array(image.shape[::-1]) / size

@@ -20,7 +20,7 @@ from handeye.evaluation.closed_loop import ClosedLoop, camera_poses
 from handeye.evaluation.comparison import POLICIES
 from handeye.evaluation.picture_style import INK, POLICY_LOOKS, QUIET, light_grid, plain_ticks
 from handeye.robots import open_arm
-from handeye.session.loop import START_VIEWS
+from handeye.session.deciding import START_VIEWS
 from handeye.session.simulated import LENS, PARAMETERS, SIZE_PX, SimulationOptions
 from handeye.types import Camera, View
 

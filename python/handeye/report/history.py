@@ -6,9 +6,9 @@ import numpy as np
 
 from handeye.errors import HandeyeError, InputError
 from handeye.report.document import Attempt, CurvePoint, Request, Within
-from handeye.robots import ArmKinematics, open_arm
+from handeye.robots import ArmKinematics, arm_kinematics, open_arm
 from handeye.session.configuration import Configuration
-from handeye.session.loop import START_VIEWS
+from handeye.session.deciding import START_VIEWS
 from handeye.session.request import reach
 from handeye.session.store import JOURNAL_FILE, is_session, read_journal, read_settings
 from handeye.solving import Measurements, make_estimator
@@ -27,10 +27,13 @@ def arm_of(folder: Path, recording: Recording, model: ModelName) -> ArmKinematic
     if not is_session(folder) or model is not ModelName.AUTO:
         return None
     asked = Configuration.from_dict(read_settings(folder).get("configuration"))
-    if not asked.joints_err or any(view.joints_rad is None for view in recording.views):
+    joints_known = all(view.joints_rad is not None for view in recording.views)
+    if asked.robot is None or not asked.joints_err or not joints_known:
         return None
     try:
-        return ArmKinematics(open_arm(asked.robot))
+        arm = open_arm(asked.robot)
+        # A recording may be in other frames than the description; a driver reports in its frames.
+        return arm_kinematics(arm, recording.views) if asked.is_replay else ArmKinematics(arm)
     except InputError:
         return None
 

@@ -13,7 +13,11 @@ NEAR_M, NEAR_RAD = 1e-3, 1e-2
 
 
 class ReplayRobot:
-    """Goes to the recorded view that a goal means, and reads back what was recorded."""
+    """Goes to the recorded view that a goal means, and reads back what was recorded.
+
+    That is the view after which the goal is labelled (`im_07.1`), or else the first one whose pose is the
+    goal.
+    """
 
     def __init__(self, views: Sequence[View]) -> None:
         self._views = tuple(views)
@@ -25,14 +29,15 @@ class ReplayRobot:
         return self._at
 
     def move_to(self, goal: Goal) -> None:
-        """Go to the view whose pose is the goal.
+        """Go to the view that the goal means.
 
         Raises
         ------
         DeviceError
             No view was recorded there.
         """
-        for view in self._views:
+        named = goal.label.rpartition(".")[0]
+        for view in sorted(self._views, key=lambda view: view.name != named):
             if is_near(view.T_base_flange, goal.T_base_flange):
                 self._at = view
                 return

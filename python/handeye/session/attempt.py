@@ -39,7 +39,7 @@ class Patience:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What an attempt brought: the pose read back, the points, the image."""
+    """What an attempt brought: the pose read back, the points, whether their labels are sure, the image."""
 
     reading: Reading
     detection: Detection
@@ -47,6 +47,7 @@ class Seen:
     digest: str | None
     timestamp_s: float | None
     note: str
+    labels_known: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +69,9 @@ class Cell:
     robot, source
         The drivers.
     arm
-        Description of the arm.
+        Description of the arm; None if it is not known and nothing really moves.
     workspace
-        What no motion may leave.
+        What no motion may leave; None where nothing really moves.
     camera, target
         As calibrated and as printed.
     confirm
@@ -79,8 +80,8 @@ class Cell:
 
     robot: Robot
     source: ImageSource
-    arm: Arm
-    workspace: Workspace
+    arm: Arm | None
+    workspace: Workspace | None
     camera: Camera
     target: Target
     patience: Patience = field(default_factory=Patience)
@@ -126,7 +127,7 @@ def attempt(
     foresee
         Tells from the pose read back where in the image the target should be.
     """
-    if not cell.workspace.contains(goal.T_base_flange.translation):
+    if cell.workspace is not None and not cell.workspace.contains(goal.T_base_flange.translation):
         return Missed(Failure.MOTION_REFUSED, "the goal is outside the stated workspace", moved=False)
     if cell.confirm is not None and not cell.confirm(goal):
         return Missed(Failure.NOT_CONFIRMED, "not confirmed", moved=False)
@@ -148,7 +149,7 @@ def attempt(
         off = 1e3 * float(np.linalg.norm(difference.translation))
         turn = float(np.rad2deg(difference.rotation_angle_rad))
         note = f"ended {off:.1f} mm and {turn:.2f} deg from the goal; the pose read back is used"
-        if not cell.workspace.contains(reading.T_base_flange.translation):
+        if cell.workspace is not None and not cell.workspace.contains(reading.T_base_flange.translation):
             cell.stop()
             return Missed(Failure.ELSEWHERE, f"{note.split(';')[0]}, outside the workspace", moved=True)
     started = time.monotonic()
@@ -165,7 +166,8 @@ def attempt(
     if isinstance(found, Missed):
         return found
     detection, digest = found
-    return Seen(reading, detection, frame.image, digest, frame.timestamp_s, note)
+    sure = frame.points is not None and frame.points.labels_known
+    return Seen(reading, detection, frame.image, digest, frame.timestamp_s, note, sure)
 
 
 def _look(

@@ -1,7 +1,7 @@
 """Everything that was asked for, as it is written into a session, and the cell that follows from it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import msgspec
@@ -10,20 +10,26 @@ import numpy as np
 from handeye.cameras.render import Appearance
 from handeye.cameras.simulated import Optics
 from handeye.errors import InputError
+from handeye.importing import SourceOptions, open_folder
 from handeye.planning.collisions import Workspace
 from handeye.planning.policies import make_policy
 from handeye.planning.sieve import ViewLimits
 from handeye.robots import Arm, open_arm
 from handeye.robots.protocol import Goal
+from handeye.robots.replay import ReplayRobot
 from handeye.robots.simulated import ArmErrors, SimulatedArm
 from handeye.session.attempt import Cell, Patience
-from handeye.session.drivers import Person, open_camera, open_robot
+from handeye.session.choosing import ArmChooser
+from handeye.session.deciding import Chooser
+from handeye.session.drivers import REPLAY, Person, open_camera, open_robot, replayed_camera
 from handeye.session.faults import FaultRates
-from handeye.session.loop import Progress, Session, Wish
+from handeye.session.loop import Progress, Session
+from handeye.session.recorded import RecordedChooser
 from handeye.session.simulated import SimulationOptions, simulated_cell, usual_errors
 from handeye.session.starting import Start
 from handeye.session.store import SessionStore, create_session, open_session
-from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth
+from handeye.session.wish import Wish
+from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth, View
 from handeye.types.calibration import ModelName
 from handeye.types.plain import read_document
 
@@ -51,7 +57,7 @@ class Configuration:
     Parameters
     ----------
     robot
-        Name of a shipped arm, or a URDF file.
+        Name of a shipped arm, or a URDF file; None for a replay of an arm that is not known.
     driver, images
         Specifications of the drivers, see `handeye.session.drivers`.
     workspace_m
@@ -60,7 +66,7 @@ class Configuration:
         Joints to start from, for an arm that is simulated; others start where they stand.
     """
 
-    robot: str
+    robot: str | None
     driver: str = SIMULATED
     images: str = SIMULATED
     mounting: Mounting = Mounting.EYE_IN_HAND
@@ -84,6 +90,11 @@ class Configuration:
     def is_simulated(self) -> bool:
         """Whether nothing moves."""
         return self.driver == SIMULATED
+
+    @property
+    def is_replay(self) -> bool:
+        """Whether a recording is gone through again."""
+        return self.driver.partition(":")[0] == REPLAY
 
     def wish(self) -> Wish:
         """Return what is asked for."""
@@ -135,15 +146,61 @@ class Configuration:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A run, ready to begin: the cell, where the arm stands, and the truth if it is simulated."""
+    """A run, ready to begin.
+
+    Parameters
+    ----------
+    cell
+        The world.
+    start
+        Where the arm stands; None in a replay, which begins with any view.
+    recording
+        What its views will be written into.
+    truth
+        What is true, where that is known.
+    hidden_arm
+        The arm as it is, if it is simulated.
+    recorded
+        The views that a replay goes through.
+    """
 
     configuration: Configuration
-    arm: Arm
     cell: Cell
-    start: Start
+    start: Start | None
     recording: Recording
-    truth: Truth | None
-    hidden_arm: SimulatedArm | None
+    truth: Truth | None = None
+    hidden_arm: SimulatedArm | None = None
+    recorded: tuple[View, ...] | None = None
+
+    @property
+    def arm(self) -> Arm:
+        """The arm.
+
+        Raises
+        ------
+        InputError
+            A replay of an arm that is not known.
+        """
+        if self.cell.arm is None:
+            raise InputError(
+                "the arm is not known", code="missing_value", hint="name it with its description"
+            )
+        return self.cell.arm
+
+    def chooser(self) -> Chooser:
+        """Return what decides where to go.
+
+        Raises
+        ------
+        InputError
+            Recorded poses that are not those of the arm.
+        """
+        cell, wish = self.cell, self.configuration.wish()
+        if self.recorded is not None:
+            return RecordedChooser(self.recorded, wish, cell.arm)
+        if cell.workspace is None or self.start is None:
+            raise InputError("a workspace and where the arm stands are needed", code="missing_value")
+        return ArmChooser(self.arm, cell.workspace, cell.camera, self.start, wish, self.configuration.limits)
 
 
 def prepare(
@@ -160,7 +217,7 @@ def prepare(
     Parameters
     ----------
     camera, target
-        Needed unless the cell is simulated.
+        Needed unless the cell is simulated; a replay has them from its recording.
     person
         Asked by the drivers that need a person.
     start
@@ -174,6 +231,10 @@ def prepare(
         A driver fails.
     """
     configuration.wish()  # refused now rather than once the arm has moved
+    if configuration.is_replay:
+        return _replayed(configuration, camera, confirm)
+    if configuration.robot is None:
+        raise InputError("no arm is named", code="missing_value", hint="only a replay does without")
     arm = open_arm(configuration.robot)
     if configuration.is_simulated:
         return _simulated(configuration, arm, target, confirm)
@@ -189,7 +250,7 @@ def prepare(
         joints = reading.joints_rad or tuple(arm.inverse(reading.T_base_flange).tolist())
         start = Start(reading.T_base_flange, joints)
     recording = Recording(f"session with {arm.name}", configuration.mounting, camera, target, ())
-    return Prepared(configuration, arm, cell, start, recording, None, None)
+    return Prepared(configuration, cell, start, recording)
 
 
 def begin(prepared: Prepared, folder: Any, progress: Progress | None = None) -> tuple[Session, SessionStore]:  # noqa: ANN401
@@ -197,18 +258,20 @@ def begin(prepared: Prepared, folder: Any, progress: Progress | None = None) -> 
 
     Raises
     ------
+    InputError
+        Recorded poses that are not those of the arm.
     OutputError
         The folder is not empty or cannot be written.
     """
-    settings = {
-        "configuration": prepared.configuration.to_dict(),
-        "start": {
+    settings: dict[str, Any] = {"configuration": prepared.configuration.to_dict()}
+    if prepared.start is not None:
+        settings["start"] = {
             "T_base_flange": prepared.start.T_base_flange.to_list(),
             "joints_rad": list(prepared.start.joints_rad),
-        },
-    }
+        }
+    chooser = prepared.chooser()
     store = create_session(folder, prepared.recording, settings)
-    return _session(prepared, store, progress), store
+    return Session(prepared.cell, store, chooser, prepared.configuration.wish(), progress), store
 
 
 def go_on(
@@ -230,7 +293,7 @@ def go_on(
     store = open_session(folder)
     try:
         configuration = Configuration.from_dict(store.settings.get("configuration"))
-        start = read_start(store.settings)
+        start = None if configuration.is_replay else read_start(store.settings)
         recording = store.recording
         prepared = prepare(
             configuration,
@@ -240,13 +303,14 @@ def go_on(
             confirm=confirm,
             start=start,
         )
-        if prepared.hidden_arm is not None:
+        if prepared.hidden_arm is not None and start is not None:
             standing = next((e.goal_joints for e in reversed(store.entries) if e.moved), start.joints_rad)
             prepared.hidden_arm.place(standing)
+        session = Session(prepared.cell, store, prepared.chooser(), configuration.wish(), progress)
     except BaseException:
         store.close()
         raise
-    return _session(prepared, store, progress), store, prepared
+    return session, store, prepared
 
 
 def read_start(settings: Mapping[str, Any]) -> Start:
@@ -267,9 +331,33 @@ class _StartDocument:
     joints_rad: list[float]
 
 
-def _session(prepared: Prepared, store: SessionStore, progress: Progress | None) -> Session:
-    configuration = prepared.configuration
-    return Session(prepared.cell, store, prepared.start, configuration.wish(), configuration.limits, progress)
+def _replayed(
+    configuration: Configuration,
+    camera: Camera | None,
+    confirm: Callable[[Goal], bool] | None,
+) -> Prepared:
+    if configuration.images.partition(":")[0] != REPLAY:
+        raise InputError("a replayed robot needs the replayed camera", code="unknown_driver")
+    address = configuration.driver.partition(":")[2]
+    opened = open_folder(address, SourceOptions(camera=camera))
+    source = opened.recording
+    robot = ReplayRobot(source.views)
+    arm = None if configuration.robot is None else open_arm(configuration.robot)
+    cell = Cell(
+        robot,
+        replayed_camera(opened, robot),
+        arm,
+        None,
+        source.camera,
+        source.target,
+        configuration.patience,
+        confirm,
+    )
+    recording = Recording(
+        f"replay of {source.name}", source.mounting, source.camera, source.target, (), None, source.source
+    )
+    configuration = replace(configuration, mounting=source.mounting)
+    return Prepared(configuration, cell, None, recording, source.truth, recorded=source.views)
 
 
 def _simulated(
@@ -296,7 +384,7 @@ def _simulated(
     cell = Cell(
         cell.robot, cell.source, arm, workspace, cell.camera, cell.target, configuration.patience, confirm
     )
-    return Prepared(configuration, arm, cell, made.start, made.recording, made.truth, made.hidden_arm)
+    return Prepared(configuration, cell, made.start, made.recording, made.truth, made.hidden_arm)
 
 
 def _nobody(question: str) -> str:

@@ -13,20 +13,21 @@ from typing import Any
 
 from handeye.cameras.capture import Capture
 from handeye.cameras.folder import WatchedFolder
-from handeye.cameras.protocol import ImageSource
+from handeye.cameras.protocol import Grey, ImageSource
 from handeye.cameras.replay import ReplayCamera
-from handeye.datasets import LoadedRecording, read_recording
 from handeye.datasets.images import read_image
 from handeye.errors import DeviceError, InputError
+from handeye.importing import Opened, open_folder
 from handeye.robots.manual import ManualRobot
 from handeye.robots.notations import Notation
 from handeye.robots.protocol import Robot
 from handeye.robots.replay import ReplayRobot
 from handeye.types import View
 
+REPLAY = "replay"
 ROBOT_GROUP, CAMERA_GROUP = "handeye.robots", "handeye.cameras"
-ROBOTS = ("simulated", "manual", "replay")
-CAMERAS = ("simulated", "folder", "opencv", "replay")
+ROBOTS = ("simulated", "manual", REPLAY)
+CAMERAS = ("simulated", "folder", "opencv", REPLAY)
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,8 @@ def open_robot(spec: str, person: Person) -> Robot:
                 f"notation {address!r}, expected one of {', '.join(Notation)}", code="unknown_notation"
             ) from None
         return ManualRobot(person.ask, person.tell, notation)
-    if name == "replay":
-        return ReplayRobot(read_recording(address).recording.views)
+    if name == REPLAY:
+        return ReplayRobot(open_folder(address).recording.views)
     return _announced(ROBOT_GROUP, name, address, ROBOTS, Robot)
 
 
@@ -76,23 +77,20 @@ def open_camera(spec: str, robot: Robot, person: Person) -> ImageSource:
         return WatchedFolder(Path(address), read_image, announce=person.tell)
     if name == "opencv":
         return Capture(int(address) if address.isdecimal() else address)
-    if name == "replay":
+    if name == REPLAY:
         if not isinstance(robot, ReplayRobot):
             raise InputError("a replayed camera needs a replayed robot", code="unknown_driver")
-        loaded = read_recording(address)
-        has_images = any(view.image is not None for view in loaded.recording.views)
-        return ReplayCamera(lambda: robot.view, _reader(loaded) if has_images else None)
+        return replayed_camera(open_folder(address), robot)
     return _announced(CAMERA_GROUP, name, address, CAMERAS, ImageSource)
 
 
-def _reader(loaded: LoadedRecording) -> Callable[[View], Any]:
-    def read(view: View) -> Any:  # noqa: ANN401 - an image
-        path = loaded.image_path(view)
-        if path is None:
-            raise DeviceError(f"view {view.name}: no image was kept", code="no_image")
-        return read_image(path)
+def replayed_camera(opened: Opened, robot: ReplayRobot) -> ReplayCamera:
+    """Return the camera of a recording: its points, and its pictures where they were kept."""
 
-    return read
+    def read(view: View) -> Grey | None:
+        return None if view.image is None else read_image(opened.folder / view.image)
+
+    return ReplayCamera(lambda: robot.view, read)
 
 
 def _announced(group: str, name: str, address: str, own: tuple[str, ...], kind: type[Any]) -> Any:  # noqa: ANN401

@@ -40,6 +40,11 @@ def test_solvers_reach_the_same_optimum(name: str) -> None:
     assert found / least - 1 > -1e-6
 
 
+def test_a_factor_graph_reaches_the_same_optimum() -> None:
+    pytest.importorskip("gtsam", reason="the peers of requirements/bench.txt are not installed")
+    test_solvers_reach_the_same_optimum("gtsam")
+
+
 @pytest.mark.parametrize("name", SCORERS)
 def test_scorers_give_the_same_gains(name: str) -> None:
     cell = make_cell("pinhole", 5, 16, 0)

@@ -16,6 +16,7 @@ use super::smooth::SmoothError;
 use super::weigh::{Equations, Sums, View};
 use super::weigh_links::LinkSums;
 use crate::error::Error;
+use crate::positive::Factor;
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
 
@@ -231,7 +232,7 @@ fn finish(
         if weight < NEGLIGIBLE {
             continue;
         }
-        let Some(factor) = linear.information.clone().cholesky() else { continue };
+        let Some(factor) = Factor::new(&linear.information) else { continue };
         let inverse = factor.inverse();
         let block = inverse.fixed_view::<6, 6>(0, 0).into_owned();
         sizes.push((weight, block.determinant().max(f64::MIN_POSITIVE).ln() / 6.0));

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Matrix6};
 
 use crate::error::Error;
+use crate::positive::Factor;
 
 /// Number of parameters of `X` and `Y`.
 pub const CHAIN: usize = 12;
@@ -87,20 +88,12 @@ pub fn entropy(n: usize, log_determinant_covariance: f64) -> f64 {
     0.5 * (n as f64 * two_pi_e.ln() + log_determinant_covariance)
 }
 
-/// Inverse and log-determinant by Cholesky of the matrix scaled to a unit diagonal (units differ by orders).
+/// Inverse and log-determinant of a positive definite matrix.
 pub(super) fn invert(m: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
-    let n = m.nrows();
-    if m.iter().any(|x| !x.is_finite()) || (0..n).any(|i| m[(i, i)] <= 0.0) {
+    if m.as_slice().iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let scale: Vec<f64> = (0..n).map(|i| 1.0 / m[(i, i)].sqrt()).collect();
-    let factor = DMatrix::from_fn(n, n, |i, j| m[(i, j)] * scale[i] * scale[j]).cholesky()?;
-    let log_determinant = 2.0 * (0..n).map(|i| factor.l_dirty()[(i, i)].ln() - scale[i].ln()).sum::<f64>();
-    let mut inverse = factor.inverse();
-    for i in 0..n {
-        for j in 0..n {
-            inverse[(i, j)] *= scale[i] * scale[j];
-        }
-    }
-    inverse.iter().all(|x| x.is_finite()).then_some((inverse, log_determinant))
+    let factor = Factor::new(m)?;
+    let inverse = factor.inverse();
+    inverse.as_slice().iter().all(|x| x.is_finite()).then(|| (inverse, factor.log_determinant()))
 }

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::report::{Ending, Solution};
+use crate::positive::Factor;
 
 /// Smallest pivot of the equilibrated information that counts as determined. A pivot is one minus the squared
 /// multiple correlation of a parameter with those before it; rounding alone leaves about 1e-15.
@@ -40,14 +41,12 @@ pub(super) fn is_degenerate(information: &DMatrix<f64>) -> bool {
     smallest_pivot(information) < PIVOT_LIMIT
 }
 
-/// Smallest pivot of the Cholesky factorisation of `h` scaled to a unit diagonal; zero if it does not exist.
-fn smallest_pivot(h: &DMatrix<f64>) -> f64 {
-    let n = h.nrows();
-    let scale: Vec<f64> = (0..n).map(|i| 1.0 / h[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
-    let scaled = DMatrix::from_fn(n, n, |i, j| h[(i, j)] * scale[i] * scale[j]);
-    if scaled.iter().any(|x| !x.is_finite()) {
+/// Smallest pivot of the factorisation of `h` as a share of its diagonal; zero if it does not exist.
+pub(super) fn smallest_pivot(h: &DMatrix<f64>) -> f64 {
+    if h.as_slice().iter().any(|x| !x.is_finite()) {
         return 0.0;
     }
-    let Some(factor) = scaled.cholesky() else { return 0.0 };
-    (0..n).map(|i| factor.l_dirty()[(i, i)].powi(2)).fold(f64::INFINITY, f64::min)
+    let Some(factor) = Factor::new(h) else { return 0.0 };
+    let shares = factor.pivots().enumerate().map(|(i, pivot)| pivot / h[(i, i)]);
+    shares.fold(f64::INFINITY, f64::min)
 }

@@ -54,9 +54,14 @@ impl Problem {
                 pixels.len()
             )));
         }
+        // Without a way out in the middle these go many at a time.
+        let finite = pixels.iter().fold(true, |fine, p| fine & p.x.is_finite() & p.y.is_finite());
         for (k, pair) in offsets.windows(2).enumerate() {
             if pair[1] < pair[0] + 3 {
                 return Err(Error::invalid(format!("view {k} has fewer than 3 points")));
+            }
+            if finite {
+                continue;
             }
             for (i, pixel) in pixels[pair[0]..pair[1]].iter().enumerate() {
                 if !(pixel.x.is_finite() && pixel.y.is_finite()) {
@@ -67,7 +72,7 @@ impl Problem {
         let whitening = covariances.map(|all| whitening(all, pixels.len())).transpose()?;
         let mut problem = Self { camera, features, pixels, whitening, offsets, motions, measurements: None };
         let views: Vec<usize> = (0..problem.view_count()).collect();
-        problem.measurements = Measurements::new(&problem, &views);
+        problem.measurements = Measurements::new(&problem, &views, false);
         Ok(problem)
     }
 

@@ -61,6 +61,10 @@ pub struct Start {
     pub y: Se3,
 }
 
+/// Damping to begin with, and by how much a step that the model foresaw lowers it at most: what is damped beyond need
+/// keeps poorly determined directions from converging as fast as Newton's method would.
+const FIRST_DAMPING: f64 = 1e-5;
+const LARGEST_RELIEF: f64 = 0.01;
 /// Damping at which no further try makes sense.
 const LARGEST_DAMPING: f64 = 1e16;
 /// Squared whitened residual per sample below which a cost is rounding.
@@ -89,14 +93,17 @@ pub fn solve(
     let samples: usize = views.iter().map(|k| problem.point_count(*k)).sum();
     let hidden = |k| Error::numerical(format!("the start puts points of view {k} out of the camera's sight"));
     let in_order = views.iter().copied().eq(0..problem.view_count());
+    // An error of the robot is that of a whole view.
+    let whole = model.robot.is_some();
+    let ready = problem.measurements().filter(|m| in_order && (!whole || m.parts == 1));
     let packed;
-    let measurements = match fits(problem, model) {
-        false => None,
-        true if in_order => problem.measurements(),
-        true => {
-            packed = Measurements::new(problem, views);
-            packed.as_ref()
-        }
+    let measurements = if !fits(problem, model) {
+        None
+    } else if ready.is_some() {
+        ready
+    } else {
+        packed = Measurements::new(problem, views, whole);
+        packed.as_ref()
     };
     if let Some(measurements) = measurements {
         let unit = VectorUnit::widest();
@@ -114,7 +121,7 @@ pub(super) fn iterate(engine: &mut dyn Engine, options: &Options, samples: usize
     let mut cost = initial_cost;
     let floor = ROUNDING_COST * samples as f64;
     let damped = options.method == Method::LevenbergMarquardt;
-    let mut damping = if damped { 1e-4 } else { 0.0 };
+    let mut damping = if damped { FIRST_DAMPING } else { 0.0 };
     let mut growth = 2.0;
     let mut rises = 0;
     let mut iterations = 0;
@@ -160,7 +167,7 @@ pub(super) fn iterate(engine: &mut dyn Engine, options: &Options, samples: usize
         cost = trial;
         if damped {
             let ratio = decrease / predicted;
-            damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 9.0);
+            damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(LARGEST_RELIEF);
             damping = damping.max(1e-15);
             growth = 2.0;
         } else if decrease < 0.0 {

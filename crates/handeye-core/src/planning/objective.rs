@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Matrix3x6, Vector3};
 
 use crate::error::Error;
+use crate::positive::Factor;
 use crate::se3::hat;
 
 /// A concave function `phi` of the information; larger is better.
@@ -116,34 +117,14 @@ fn nuisance(information: &DMatrix<f64>) -> DMatrix<f64> {
     information.view((6, 6), (n, n)).into_owned()
 }
 
-/// Cholesky of the matrix scaled to a unit diagonal, and the scales.
-fn scaled(m: &DMatrix<f64>) -> Option<(nalgebra::Cholesky<f64, nalgebra::Dyn>, Vec<f64>)> {
-    let n = m.nrows();
-    if (0..n).any(|i| m[(i, i)] <= 0.0 || !m[(i, i)].is_finite()) {
-        return None;
-    }
-    let scale: Vec<f64> = (0..n).map(|i| m[(i, i)].sqrt().recip()).collect();
-    let factor = DMatrix::from_fn(n, n, |i, j| m[(i, j)] * scale[i] * scale[j]).cholesky()?;
-    Some((factor, scale))
-}
-
 fn log_determinant(m: &DMatrix<f64>) -> Option<f64> {
-    let (factor, scale) = scaled(m)?;
-    Some(2.0 * (0..m.nrows()).map(|i| factor.l_dirty()[(i, i)].ln() - scale[i].ln()).sum::<f64>())
+    Factor::new(m).map(|factor| factor.log_determinant())
 }
 
 fn inverse(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    inverse_and_log_determinant(m).map(|(inverse, _)| inverse)
+    Factor::new(m).map(|factor| factor.inverse())
 }
 
 fn inverse_and_log_determinant(m: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
-    let (factor, scale) = scaled(m)?;
-    let pivots: f64 = (0..m.nrows()).map(|i| (factor.l_dirty()[(i, i)] / scale[i]).ln()).sum();
-    let mut inverse = factor.inverse();
-    for i in 0..m.nrows() {
-        for j in 0..m.nrows() {
-            inverse[(i, j)] *= scale[i] * scale[j];
-        }
-    }
-    Some((inverse, 2.0 * pivots))
+    Factor::new(m).map(|factor| (factor.inverse(), factor.log_determinant()))
 }

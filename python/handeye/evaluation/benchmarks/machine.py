@@ -12,7 +12,8 @@ from typing import Any
 from handeye.errors import HandeyeError
 
 PACKAGES = (
-    "handeye", "numpy", "scipy", "opencv-contrib-python-headless", "jax", "jaxlib", "pyceres", "cmeel-eigen",
+    "handeye", "numpy", "scipy", "opencv-contrib-python-headless", "jax", "jaxlib", "pyceres", "gtsam",
+    "cmeel-eigen",
 )  # fmt: skip
 # Widest last.
 VECTOR_FLAGS = (("avx2", "AVX2"), ("avx512f", "AVX-512"))

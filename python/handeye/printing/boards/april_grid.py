@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handeye.cameras.pattern import marker_bits
+from handeye.pattern import marker_bits
 from handeye.printing.boards.base import Board, Ink, Measures, default, mm
 from handeye.printing.outline import outline
 from handeye.printing.shapes import Area, rectangle

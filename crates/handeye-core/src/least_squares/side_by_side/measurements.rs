@@ -1,4 +1,8 @@
-//! Measurements of views as structure of arrays: one view per lane.
+//! Measurements of views as structure of arrays: a view, or a part of one, per lane.
+
+use std::ops::Range;
+
+use nalgebra::Vector2;
 
 use crate::camera::Feature;
 use crate::least_squares::Problem;
@@ -20,10 +24,10 @@ pub(in crate::least_squares) struct Point {
 /// Square roots of the information of a point of each view, `[w11, w21, w22]` of a lower triangle.
 pub(super) type Whitening = [Row; 3];
 
-/// As many views as the widest vector has lanes.
+/// As many views, or parts of views, as the widest vector has lanes.
 #[derive(Clone, Debug)]
 pub(in crate::least_squares) struct Group {
-    /// Points of each view; zero for a lane without a view.
+    /// Points of each lane; of the first for a lane without a view.
     pub counts: Row,
     /// Up to here every lane has a point; the rest repeats a lane's first.
     pub full: usize,
@@ -36,40 +40,65 @@ pub(in crate::least_squares) struct Group {
 #[derive(Clone, Debug)]
 pub(in crate::least_squares) struct Measurements {
     pub groups: Vec<Group>,
+    /// Lanes that share the points of a view; they follow one another.
+    pub parts: usize,
 }
 
+/// What a group costs beside its points, in points.
+const GROUP_COST: usize = 12;
+
 impl Measurements {
-    /// None if a view sees a circle.
-    pub fn new(problem: &Problem, views: &[usize]) -> Option<Self> {
-        let is_point = |f: &Feature| f.radius == 0.0;
-        if !views.iter().all(|k| problem.features()[problem.samples(*k)].iter().all(is_point)) {
+    /// With views in as many parts as go fastest, or `whole`; None if a view sees a circle.
+    pub fn new(problem: &Problem, views: &[usize], whole: bool) -> Option<Self> {
+        if problem.features().iter().any(|f| f.radius != 0.0) && sees_circle(problem, views) {
             return None;
         }
-        Some(Self { groups: views.chunks(MAX_LANES).map(|views| group(problem, views)).collect() })
+        let longest = views.iter().map(|k| problem.point_count(*k)).max().unwrap_or(0);
+        let cost =
+            |parts: usize| (views.len() * parts).div_ceil(MAX_LANES) * (longest.div_ceil(parts) + GROUP_COST);
+        let parts = if !whole && cost(2) < cost(1) { 2 } else { 1 };
+        let lanes: Vec<Range<usize>> = views.iter().flat_map(|k| split(problem.samples(*k), parts)).collect();
+        Some(Self { groups: lanes.chunks(MAX_LANES).map(|lanes| group(problem, lanes)).collect(), parts })
     }
 }
 
-fn group(problem: &Problem, views: &[usize]) -> Group {
+fn sees_circle(problem: &Problem, views: &[usize]) -> bool {
+    views.iter().any(|k| problem.features()[problem.samples(*k)].iter().any(|f| f.radius != 0.0))
+}
+
+/// The samples of a view in parts of about the same size; a view has three at least.
+fn split(samples: Range<usize>, parts: usize) -> impl Iterator<Item = Range<usize>> {
+    let bound = move |i: usize| samples.start + samples.len() * i / parts;
+    (0..parts).map(move |i| bound(i)..bound(i + 1))
+}
+
+fn group(problem: &Problem, lanes: &[Range<usize>]) -> Group {
     const ZERO: Row = [0.0; MAX_LANES];
-    let counts = |lane: usize| views.get(lane).map_or(0, |k| problem.point_count(*k));
-    let longest = (0..MAX_LANES).map(counts).max().unwrap_or(0);
+    // A lane without a view repeats the first.
+    let samples = |lane: usize| lanes[if lane < lanes.len() { lane } else { 0 }].clone();
+    let counts: [usize; MAX_LANES] = std::array::from_fn(|lane| samples(lane).len());
+    let longest = counts.iter().copied().max().unwrap_or(0);
     let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|i| problem.camera().parameters[i]);
+    let inverse_focal = [1.0 / fx, 1.0 / fy];
     let whitened = problem.whitening(0).is_some();
     let mut points = vec![Point { position: [ZERO; 3], seen: [ZERO; 2] }; longest];
     let mut whitening = vec![[ZERO; 3]; if whitened { longest } else { 0 }];
     for lane in 0..MAX_LANES {
-        // A lane without a view repeats the first, and counts for nothing.
-        let samples = problem.samples(views[if lane < views.len() { lane } else { 0 }]);
-        let features = &problem.features()[samples.clone()];
-        let pixels = &problem.pixels()[samples.clone()];
-        let repeated = std::iter::repeat((&features[0], &pixels[0]));
-        let all = features.iter().zip(pixels).chain(repeated);
-        for (point, (feature, pixel)) in points.iter_mut().zip(all) {
+        let samples = samples(lane);
+        let (features, pixels) = (&problem.features()[samples.clone()], &problem.pixels()[samples.clone()]);
+        let set = |point: &mut Point, feature: &Feature, pixel: &Vector2<f64>| {
             for axis in 0..3 {
                 point.position[axis][lane] = feature.position[axis];
             }
-            point.seen[0][lane] = (pixel.x - cx) / fx;
-            point.seen[1][lane] = (pixel.y - cy) / fy;
+            point.seen[0][lane] = (pixel.x - cx) * inverse_focal[0];
+            point.seen[1][lane] = (pixel.y - cy) * inverse_focal[1];
+        };
+        let (own, spare) = points.split_at_mut(samples.len());
+        for (point, (feature, pixel)) in own.iter_mut().zip(features.iter().zip(pixels)) {
+            set(point, feature, pixel);
+        }
+        for point in spare {
+            set(point, &features[0], &pixels[0]);
         }
         for (i, rows) in whitening.iter_mut().enumerate() {
             let sample = if i < samples.len() { samples.start + i } else { samples.start };
@@ -80,6 +109,6 @@ fn group(problem: &Problem, views: &[usize]) -> Group {
             }
         }
     }
-    let full = (0..MAX_LANES).map(counts).min().unwrap_or(0);
-    Group { counts: std::array::from_fn(|lane| counts(lane) as f64), full, points, whitening }
+    let full = counts.into_iter().min().unwrap_or(0);
+    Group { counts: counts.map(|count| count as f64), full, points, whitening }
 }

@@ -8,6 +8,7 @@
 mod look;
 mod measurements;
 mod normal;
+mod step;
 #[cfg(test)]
 mod tests;
 
@@ -16,7 +17,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 use self::look::{Look, Optics, Sight};
 pub(super) use self::measurements::Measurements;
 use self::measurements::Row;
-use self::normal::{Correct, Errors, Matrix12, Noise, Normal, Vector12, correction, lane, set_lane};
+use self::normal::{Correct, Desk, Errors, Matrix12, Noise, Normal, Vector12, correction, lane, set_lane};
+use self::step::Step;
 use super::engine::{Engine, Proposal, is_degenerate};
 use super::loss::Loss;
 use super::model::{Model, Side};
@@ -57,6 +59,7 @@ pub(super) struct SideBySide<'a> {
     h: Matrix12,
     g: Vector12,
     step: Vector12,
+    desk: Desk,
 }
 
 /// Whether the engine can do it: corners, a lens of the kind that lanes know, and nothing free but `X` and `Y`.
@@ -80,10 +83,11 @@ impl<'a> SideBySide<'a> {
         let mut information = vec![ZERO; groups];
         let mut motions = vec![[ZERO; 12]; groups];
         for i in 0..groups * MAX_LANES {
-            // Lanes without a view repeat the first of their group.
+            // Lanes without a view repeat the first of their group, and count for nothing.
             let (group, at) = (i / MAX_LANES, i % MAX_LANES);
-            let k = *views.get(i).unwrap_or(&views[group * MAX_LANES]);
-            information[group][at] = model.pixel_sigma[k].powi(-2);
+            let own = views.get(i / measurements.parts);
+            let k = *own.unwrap_or(&views[group * MAX_LANES / measurements.parts]);
+            information[group][at] = own.map_or(0.0, |k| model.pixel_sigma[*k].powi(-2));
             set_lane(&mut motions[group], at, &entries(problem.motion(k)));
         }
         let noisy = if model.robot.is_some() { groups } else { 0 };
@@ -111,6 +115,7 @@ impl<'a> SideBySide<'a> {
             h: Matrix12::zeros(),
             g: Vector12::zeros(),
             step: Vector12::zeros(),
+            desk: Desk::new(),
         };
         engine.look()?;
         std::mem::swap(&mut engine.current, &mut engine.trial);
@@ -146,7 +151,8 @@ impl<'a> SideBySide<'a> {
             (Lens::BrownConrady8 | Lens::BrownConrady12, false) => look!(true, true, false),
         }
         let mut cost = 0.0;
-        for (i, k) in self.views.iter().enumerate() {
+        let parts = self.measurements.parts;
+        for (i, k) in self.views.iter().flat_map(|k| std::iter::repeat_n(k, parts)).enumerate() {
             let (sight, at) = (&trial.sights[i / MAX_LANES], i % MAX_LANES);
             if sight.whole[at] == 0.0 || !sight.cost[at].is_finite() {
                 return Err(*k);
@@ -193,7 +199,8 @@ impl<'a> SideBySide<'a> {
             errors: &mut self.current.errors,
             damping,
         });
-        (self.h, self.g) = dispatch(self.unit, Normal { sights: &self.current.sights, noise });
+        (self.h, self.g) =
+            dispatch(self.unit, Normal { sights: &self.current.sights, noise, desk: &mut self.desk });
         if let Some(prior) = &self.model.chain_prior {
             let (x, y) = (&self.current.x, &self.current.y);
             for (at, (information, gradient)) in [(0, prior.normal(true, x)), (6, prior.normal(false, y))] {
@@ -213,13 +220,9 @@ impl Engine for SideBySide<'_> {
 
     fn propose(&mut self, damping: f64) -> Option<Proposal> {
         self.assemble(damping);
-        let mut damped = self.h;
         let mut penalty = 0.0;
         let diagonal: Vector12 = Vector12::from_fn(|i, _| damping * self.h[(i, i)].max(1e-12));
-        for i in 0..12 {
-            damped[(i, i)] += diagonal[i];
-        }
-        self.step = damped.cholesky()?.solve(&-self.g);
+        self.step = dispatch(self.unit, Step { h: &self.h, g: &self.g, diagonal: &diagonal })?;
         if !self.step.iter().all(|x| x.is_finite()) {
             return None;
         }
@@ -261,8 +264,14 @@ impl Engine for SideBySide<'_> {
         }
         let information = DMatrix::from_column_slice(12, 12, self.h.as_slice());
         let mut correction_log_determinant = 0.0;
+        let parts = self.measurements.parts;
         let views = self.views.iter().enumerate().map(|(i, k)| {
-            let (group, at) = (i / MAX_LANES, i % MAX_LANES);
+            let (group, at) = (i * parts / MAX_LANES, i * parts % MAX_LANES);
+            let sum = |row: fn(&Sight) -> &Row| -> f64 {
+                (i * parts..(i + 1) * parts)
+                    .map(|lane| row(&self.current.sights[lane / MAX_LANES])[lane % MAX_LANES])
+                    .sum()
+            };
             let sight = &self.current.sights[group];
             let pose = lane(&sight.pose, at);
             let (mut twist, mut correction_cost) = (Vector6::zeros(), 0.0);
@@ -275,8 +284,8 @@ impl Engine for SideBySide<'_> {
             }
             ViewReport {
                 view: *k,
-                rmse_px: (sight.squared_px[at] / self.problem.point_count(*k) as f64).sqrt(),
-                cost: sight.cost[at],
+                rmse_px: (sum(|sight| &sight.squared_px) / self.problem.point_count(*k) as f64).sqrt(),
+                cost: sum(|sight| &sight.cost),
                 correction: twist,
                 correction_cost,
                 pose: Se3::new(Matrix3::from_row_slice(&pose[..9]), Vector3::from_column_slice(&pose[9..])),

@@ -53,6 +53,24 @@ pub(super) struct Noise<'a> {
 pub(super) struct Normal<'a> {
     pub sights: &'a [Sight],
     pub noise: Option<Noise<'a>>,
+    pub desk: &'a mut Desk,
+}
+
+/// Room for the sums: blocks of the information and of the gradient, each entry by lanes.
+#[repr(C, align(64))]
+pub(super) struct Desk {
+    xx: [Row; UPPER],
+    yy: [Row; UPPER],
+    xy: [Row; 36],
+    x: [Row; 6],
+    y: [Row; 6],
+}
+
+impl Desk {
+    pub fn new() -> Self {
+        const ZERO: Row = [0.0; MAX_LANES];
+        Self { xx: [ZERO; UPPER], yy: [ZERO; UPPER], xy: [ZERO; 36], x: [ZERO; 6], y: [ZERO; 6] }
+    }
 }
 
 impl Kernel for Normal<'_> {
@@ -60,7 +78,6 @@ impl Kernel for Normal<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) -> Self::Output {
-        let mut sums = Sums::new(simd);
         for (g, sight) in self.sights.iter().enumerate() {
             for at in (0..MAX_LANES).step_by(S::LANES) {
                 let mut information = load(simd, &sight.information, at);
@@ -68,117 +85,114 @@ impl Kernel for Normal<'_> {
                 if let Some(noise) = &mut self.noise {
                     eliminate(simd, noise, g, at, &mut information, &mut gradient);
                 }
-                sums.add(&information, &gradient, &load(simd, &sight.before_y, at));
+                let c = load(simd, &sight.before_y, at);
+                add(simd, self.desk, g == 0 && at == 0, &information, &gradient, &c);
             }
         }
-        sums.total()
+        total(simd, self.desk)
     }
 }
 
-/// The sums: blocks of the information and of the gradient.
-struct Sums<V> {
-    xx: [V; UPPER],
-    xy: [[V; 6]; 6],
-    yy: [V; UPPER],
-    x: [V; 6],
-    y: [V; 6],
+/// Adds `B' M B` and `B' g` with `B = [I, C]`, `C = [R, [t]R; 0, R]`, by blocks of three:
+/// with `M = [M1, M2; M2', M3]`, `M C = [M1 R, (M1 [t] + M2) R; M2' R, (M2' [t] + M3) R]`.
+#[inline(always)]
+fn add<S: Simd>(
+    simd: S,
+    desk: &mut Desk,
+    first: bool,
+    m: &[S::Vector; UPPER],
+    g: &[S::Vector; 6],
+    c: &[S::Vector; 12],
+) {
+    // M [I, [t]; 0, I], then times the rotation.
+    let mut product = [[m[0]; 6]; 6];
+    for i in 0..6 {
+        let mut shifted = [m[0]; 6];
+        for j in 0..3 {
+            let (a, b) = ((j + 1) % 3, (j + 2) % 3);
+            shifted[j] = m[upper(i, j)];
+            let first = m[upper(i, a)].mul_add(c[9 + b], m[upper(i, 3 + j)]);
+            shifted[3 + j] = m[upper(i, b)].neg_mul_add(c[9 + a], first);
+        }
+        for j in 0..3 {
+            let (p, q, r) = (c[j], c[3 + j], c[6 + j]);
+            product[i][j] = shifted[0].mul_add(p, shifted[1].mul_add(q, shifted[2] * r));
+            product[i][3 + j] = shifted[3].mul_add(p, shifted[4].mul_add(q, shifted[5] * r));
+        }
+    }
+    put(simd, &mut desk.xx, first, m);
+    for (rows, product) in desk.xy.chunks_exact_mut(6).zip(&product) {
+        put(simd, rows, first, product);
+    }
+    // [I, 0; [t]', I] M C: the lower rows and [t]' times the upper ones.
+    for i in 0..3 {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        for j in 3..6 {
+            let first = c[9 + b].mul_add(product[a][j], product[3 + i][j]);
+            product[3 + i][j] = c[9 + a].neg_mul_add(product[b][j], first);
+        }
+    }
+    let turned = |column: &[S::Vector; 3], i: usize| {
+        c[i].mul_add(column[0], c[3 + i].mul_add(column[1], c[6 + i] * column[2]))
+    };
+    let mut yy = *m;
+    for i in 0..3 {
+        for j in 0..6 {
+            if j >= i {
+                yy[upper(i, j)] = turned(&[product[0][j], product[1][j], product[2][j]], i);
+            }
+            if j >= 3 + i {
+                yy[upper(3 + i, j)] = turned(&[product[3][j], product[4][j], product[5][j]], i);
+            }
+        }
+    }
+    let mut low = [g[3], g[4], g[5]];
+    for i in 0..3 {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        low[i] = c[9 + a].neg_mul_add(g[b], c[9 + b].mul_add(g[a], low[i]));
+    }
+    let mut y = *g;
+    for i in 0..3 {
+        y[i] = turned(&[g[0], g[1], g[2]], i);
+        y[3 + i] = turned(&low, i);
+    }
+    put(simd, &mut desk.yy, first, &yy);
+    put(simd, &mut desk.x, first, g);
+    put(simd, &mut desk.y, first, &y);
 }
 
-impl<V: Vector> Sums<V> {
-    #[inline(always)]
-    fn new<S: Simd<Vector = V>>(simd: S) -> Self {
-        let zero = simd.splat(0.0);
-        Self { xx: [zero; UPPER], xy: [[zero; 6]; 6], yy: [zero; UPPER], x: [zero; 6], y: [zero; 6] }
+/// Adds to sums; to nothing at the `first`.
+#[inline(always)]
+fn put<S: Simd>(simd: S, rows: &mut [Row], first: bool, values: &[S::Vector]) {
+    for (row, value) in rows.iter_mut().zip(values) {
+        let sum = if first { *value } else { simd.load(row) + *value };
+        sum.store(row);
     }
+}
 
-    /// Adds `B' M B` and `B' g` with `B = [I, C]`, `C = [R, [t]R; 0, R]`, by blocks of three:
-    /// with `M = [M1, M2; M2', M3]`, `M C = [M1 R, (M1 [t] + M2) R; M2' R, (M2' [t] + M3) R]`.
-    #[inline(always)]
-    fn add(&mut self, m: &[V; UPPER], g: &[V; 6], c: &[V; 12]) {
-        for (sum, entry) in self.xx.iter_mut().zip(m) {
-            *sum = *sum + *entry;
+/// The sums over the lanes.
+#[inline(always)]
+fn total<S: Simd>(simd: S, desk: &Desk) -> (Matrix12, Vector12) {
+    let mut h = Matrix12::zeros();
+    let mut g = Vector12::zeros();
+    for i in 0..6 {
+        for j in i..6 {
+            let xx = simd.load(&desk.xx[upper(i, j)]).sum();
+            let yy = simd.load(&desk.yy[upper(i, j)]).sum();
+            h[(i, j)] = xx;
+            h[(j, i)] = xx;
+            h[(6 + i, 6 + j)] = yy;
+            h[(6 + j, 6 + i)] = yy;
         }
-        // M [I, [t]; 0, I], then times the rotation.
-        let mut product = [[m[0]; 6]; 6];
-        for i in 0..6 {
-            let mut shifted = [m[0]; 6];
-            for j in 0..3 {
-                let (a, b) = ((j + 1) % 3, (j + 2) % 3);
-                shifted[j] = m[upper(i, j)];
-                let first = m[upper(i, a)].mul_add(c[9 + b], m[upper(i, 3 + j)]);
-                shifted[3 + j] = m[upper(i, b)].neg_mul_add(c[9 + a], first);
-            }
-            for j in 0..3 {
-                let (p, q, r) = (c[j], c[3 + j], c[6 + j]);
-                product[i][j] = shifted[0].mul_add(p, shifted[1].mul_add(q, shifted[2] * r));
-                product[i][3 + j] = shifted[3].mul_add(p, shifted[4].mul_add(q, shifted[5] * r));
-            }
+        for j in 0..6 {
+            let xy = simd.load(&desk.xy[6 * i + j]).sum();
+            h[(i, 6 + j)] = xy;
+            h[(6 + j, i)] = xy;
         }
-        for (sums, row) in self.xy.iter_mut().zip(&product) {
-            for (sum, entry) in sums.iter_mut().zip(row) {
-                *sum = *sum + *entry;
-            }
-        }
-        // [I, 0; [t]', I] M C: the lower rows and [t]' times the upper ones.
-        for i in 0..3 {
-            let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-            for j in 3..6 {
-                let first = c[9 + b].mul_add(product[a][j], product[3 + i][j]);
-                product[3 + i][j] = c[9 + a].neg_mul_add(product[b][j], first);
-            }
-        }
-        for i in 0..3 {
-            for j in 0..6 {
-                for k in 0..3 {
-                    if j >= i {
-                        let sum = &mut self.yy[upper(i, j)];
-                        *sum = c[3 * k + i].mul_add(product[k][j], *sum);
-                    }
-                    if j >= 3 + i {
-                        let sum = &mut self.yy[upper(3 + i, j)];
-                        *sum = c[3 * k + i].mul_add(product[3 + k][j], *sum);
-                    }
-                }
-            }
-        }
-        let mut low = [g[3], g[4], g[5]];
-        for i in 0..3 {
-            let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-            low[i] = c[9 + a].neg_mul_add(g[b], c[9 + b].mul_add(g[a], low[i]));
-        }
-        for i in 0..3 {
-            self.x[i] = self.x[i] + g[i];
-            self.x[3 + i] = self.x[3 + i] + g[3 + i];
-            for k in 0..3 {
-                self.y[i] = c[3 * k + i].mul_add(g[k], self.y[i]);
-                self.y[3 + i] = c[3 * k + i].mul_add(low[k], self.y[3 + i]);
-            }
-        }
+        g[i] = simd.load(&desk.x[i]).sum();
+        g[6 + i] = simd.load(&desk.y[i]).sum();
     }
-
-    /// The sums over the lanes.
-    #[inline(always)]
-    fn total(&self) -> (Matrix12, Vector12) {
-        let mut h = Matrix12::zeros();
-        let mut g = Vector12::zeros();
-        for i in 0..6 {
-            for j in i..6 {
-                let (xx, yy) = (self.xx[upper(i, j)].sum(), self.yy[upper(i, j)].sum());
-                h[(i, j)] = xx;
-                h[(j, i)] = xx;
-                h[(6 + i, 6 + j)] = yy;
-                h[(6 + j, 6 + i)] = yy;
-            }
-            for j in 0..6 {
-                let xy = self.xy[i][j].sum();
-                h[(i, 6 + j)] = xy;
-                h[(6 + j, i)] = xy;
-            }
-            g[i] = self.x[i].sum();
-            g[6 + i] = self.y[i].sum();
-        }
-        (h, g)
-    }
+    (h, g)
 }
 
 /// Eliminates the robot's errors of a group: as `marginal::eliminate`.

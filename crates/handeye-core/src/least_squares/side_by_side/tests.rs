@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::{Measurements, SideBySide, fits};
 use crate::camera::{Camera, Feature, Lens};
+use crate::least_squares::engine::smallest_pivot;
 use crate::least_squares::general::General;
 use crate::least_squares::solver::iterate;
 use crate::least_squares::tests::Cell;
@@ -58,7 +59,7 @@ fn by_lanes(
     unit: VectorUnit,
 ) -> Result<Solution, usize> {
     assert!(fits(problem, model));
-    let measurements = Measurements::new(problem, views).expect("no circles");
+    let measurements = Measurements::new(problem, views, model.robot.is_some()).expect("no circles");
     SideBySide::new(problem, model, options, views, &measurements, start, unit)
         .map(|mut engine| iterate(&mut engine, options, problem.pixels().len()))
 }
@@ -186,6 +187,8 @@ proptest! {
             }
             let found = by_lanes(&problem, &model, &start, &views, &options, unit);
             match (&found, &expected) {
+                // A robust loss may leave too few points: whether they determine the answer is decided by rounding.
+                (Ok(_), Ok(expected)) if smallest_pivot(&expected.information) < 1e-10 => {}
                 (Ok(found), Ok(expected)) if expected.ending.is_converged() => {
                     prop_assert!(found.ending.is_converged(), "{:?} {}", found.ending, unit.name());
                     close(found, expected, &AT_THE_OPTIMUM)?;
@@ -237,7 +240,7 @@ fn an_engine_is_found_for_every_problem() {
     let discs: Vec<Feature> = cell.features.iter().map(disc).collect();
     let round = Cell { features: discs, ..Cell::new(6, 5) };
     let problem = round.problem(0.0, 3);
-    assert!(Measurements::new(&problem, &views).is_none());
+    assert!(Measurements::new(&problem, &views, false).is_none());
     let found = solve(&problem, &model, &start, &views, &Options::default()).unwrap();
     assert!((found.x.to_matrix() - round.x.to_matrix()).amax() < 1e-8);
     let fisheye =
@@ -264,5 +267,33 @@ fn parallel_axes_end_as_degenerate_in_lanes() {
     for unit in VectorUnit::ALL {
         let found = by_lanes(&problem, &Model::paper(9, 0.1), &start, &views, &Options::default(), unit);
         assert_eq!(found.unwrap().ending, Ending::Degenerate, "{}", unit.name());
+    }
+}
+
+/// Few views leave lanes free: two share the points of a view.
+#[test]
+fn parts_of_views_add_up_to_views() {
+    for (seed, count, parts) in [(0, 3, 2), (1, 4, 2), (2, 5, 1), (3, 3, 2), (4, 4, 2)] {
+        let random = &mut Random::new(seed);
+        let mut cell = Cell::new(seed, count);
+        cell.camera = camera(if seed % 2 == 0 { Lens::Pinhole } else { Lens::BrownConrady5 });
+        let problem = ragged(&cell, random, seed > 2, 0.2);
+        let views: Vec<usize> = (0..count).collect();
+        let start = cell.start(0.02, 0.01, seed);
+        let mut model = Model::paper(count, 0.2);
+        model.pixel_sigma = (0..count).map(|_| random.uniform(0.1, 0.4)).collect();
+        for whole in [false, true] {
+            let measurements = Measurements::new(&problem, &views, whole).unwrap();
+            assert_eq!(measurements.parts, if whole { 1 } else { parts });
+            let options = Options { loss: Loss::Cauchy(2.0), max_iterations: 0, ..Options::default() };
+            let expected = one_by_one(&problem, &model, &start, &views, &options).unwrap();
+            for unit in VectorUnit::ALL {
+                let measured = &measurements;
+                let mut engine =
+                    SideBySide::new(&problem, &model, &options, &views, measured, &start, unit).unwrap();
+                let found = iterate(&mut engine, &options, problem.pixels().len());
+                close(&found, &expected, &AT_ONE_POINT).unwrap();
+            }
+        }
     }
 }

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from handeye.evaluation.benchmarks.peers import chain, programs, with_jax
+from handeye.evaluation.benchmarks.peers import chain, programs, with_gtsam, with_jax
 from handeye.evaluation.benchmarks.peers.availability import MissingPeerError, optional
 from handeye.evaluation.benchmarks.problems import Cell
 from handeye.evaluation.benchmarks.stopping import MOST_STEPS
@@ -160,6 +160,10 @@ PEERS = {
     "pyceres": SolvePeer("Ceres from Python, derivatives from NumPy per view", _pyceres),
     "scipy": SolvePeer("SciPy least_squares, method lm, derivatives from NumPy", _scipy),
     "jax": SolvePeer("Levenberg-Marquardt in JAX, compiled, forward derivatives", with_jax.solver),
+    "gtsam": SolvePeer(
+        "GTSAM from Python, a factor per view with derivatives from NumPy, and marginal covariance",
+        with_gtsam.solver,
+    ),
     "opencv_shah": SolvePeer(
         "OpenCV solvePnP per view and calibrateRobotWorldHandEye, Shah", _opencv, closed_form=True
     ),

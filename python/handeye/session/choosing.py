@@ -1,0 +1,185 @@
+"""Choosing where an arm goes next: three small turns first, then the view that teaches most.
+
+Every goal lies within the limits of the joints and can be reached on a free straight path in joint space.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from handeye.planning import Planner, PlannerOptions, Stop, StopReason
+from handeye.planning.collisions import Workspace
+from handeye.planning.feasibility import Generator
+from handeye.planning.refinement import offered, refine
+from handeye.planning.sieve import ViewLimits
+from handeye.planning.travel import Travel
+from handeye.robots import Arm, ArmKinematics
+from handeye.robots.protocol import Goal
+from handeye.session.deciding import EndReason, Halt, Situation, Step, decision_of, estimator_of, halt_of
+from handeye.session.entry import TRANSIENT, Entry, Failure
+from handeye.session.starting import Start, starting_goal
+from handeye.session.wish import Wish
+from handeye.solving import Estimate
+from handeye.types import Camera, Pose
+
+
+class ArmChooser:
+    """Chooses goals for an arm that is described.
+
+    Parameters
+    ----------
+    arm, workspace
+        The arm, and what no motion may leave.
+    camera
+        As calibrated.
+    start
+        Where the arm stood when the session began.
+    wish
+        What is asked for.
+    limits
+        What makes a view usable.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        workspace: Workspace,
+        camera: Camera,
+        start: Start,
+        wish: Wish,
+        limits: ViewLimits | None = None,
+    ) -> None:
+        self._arm, self._workspace, self._camera = arm, workspace, camera
+        self._start = start
+        self._wish = wish
+        self._generator = Generator(arm, workspace, limits or ViewLimits())
+
+    @property
+    def kinematics(self) -> ArmKinematics:
+        """The arm; its controller reports poses in the frames of the description."""
+        return ArmKinematics(self._arm)
+
+    def choose(self, situation: Situation) -> Step | Halt:
+        """Return the next step, or why there is none."""
+        missed, estimate = situation.missed, situation.estimate
+        if len(missed) >= self._wish.failures_in_a_row:
+            last = missed[-1]
+            return Halt(
+                EndReason.TOO_MANY_FAILURES,
+                f"{len(missed)} attempts in a row brought no view; the last: {last.failure}: {last.detail}",
+            )
+        again = self._same_place(situation)
+        if again is not None:
+            return again
+        if estimate is None:
+            return self._starting(situation)
+        if missed and missed[-1].failure is Failure.NOT_FOUND and missed[-1].phase == "plan":
+            nudge = self._nudge(missed[-1], situation, estimate)
+            if nudge is not None:
+                return nudge
+        return self._planned(situation, estimate)
+
+    def _same_place(self, situation: Situation) -> Step | None:
+        """Return another try at the last goal, if it failed for no reason of its own."""
+        missed = situation.missed
+        if not missed or missed[-1].failure not in TRANSIENT:
+            return None
+        last = missed[-1]
+        tries = sum(1 for entry in missed if entry.goal_joints == last.goal_joints)
+        if tries >= self._wish.tries_at_a_place:
+            return None
+        goal = self._goal(situation, last.goal, last.goal_joints)
+        return Step(goal, "retry", {"after": last.number}, situation.estimate)
+
+    def _starting(self, situation: Situation) -> Step | Halt:
+        views, missed, estimate = situation.views, situation.missed, situation.estimate
+        if not views and missed and missed[-1].failure is Failure.NOT_FOUND:
+            tries = sum(1 for entry in missed if entry.failure is Failure.NOT_FOUND)
+            if tries >= self._wish.tries_at_a_place:
+                return Halt(
+                    EndReason.NO_START,
+                    f"the target is not seen where the arm stands: {missed[-1].detail}; drive it so that the "
+                    "camera sees the whole target, and begin anew",
+                )
+        places = len({entry.goal_joints for entry in missed})
+        found = starting_goal(self._start, views, places, self._camera, self._arm, self._workspace)
+        if found is None:
+            return Halt(
+                EndReason.NO_START if estimate is None else EndReason.NO_CANDIDATE,
+                "no safe pose left around where the arm stood; the workspace or the joint limits are too near"
+                if estimate is None
+                else "no pose left that the arm can take and that should show the whole target",
+            )
+        pose, joints = found
+        return Step(self._goal(situation, pose, tuple(joints.tolist())), "start", {}, estimate)
+
+    def _nudge(self, last: Entry, situation: Situation, estimate: Estimate) -> Step | None:
+        """Return the place half way back from where the target was lost to the nearest view."""
+        postures = np.array([situation.joints(view) for view in situation.views])
+        lost = np.array(last.goal_joints)
+        nearest = postures[int(np.argmin(np.abs(postures - lost).max(axis=1)))]
+        joints = 0.5 * (lost + nearest)
+        if self._generator.body(estimate).obstacle_on_path(self._standing(situation), joints) is not None:
+            return None
+        goal = self._goal(situation, Pose(self._arm.forward(joints)), tuple(joints.tolist()))
+        return Step(goal, "nudge", {"after": last.number}, estimate)
+
+    def _planned(self, situation: Situation, estimate: Estimate) -> Step | Halt:
+        standing = np.array(self._standing(situation))
+        random = np.random.default_rng([self._wish.seed, 4, len(situation.entries)])
+        postures = [situation.joints(view) for view in reversed(situation.views)]
+        shunned = [
+            entry.goal_joints
+            for entry in situation.entries
+            if entry.failure is not None and entry.failure not in TRANSIENT
+        ]
+        drawn = self._generator.draw(estimate, postures, random, shunned=shunned)
+        options = PlannerOptions(
+            policy=self._wish.policy,
+            stop_rules=self._wish.rules(),
+            sight=drawn.sight,
+            seed=self._wish.seed,
+            travel=Travel(standing, np.minimum(self._arm.velocities, self._wish.speed_rad_s)),
+        )
+        planner = Planner(situation.measurements, drawn.pool, estimator_of(estimate), options)
+        turned_down = dict(drawn.turned_down)
+        joints_of = dict(drawn.joints)
+        answer = planner.ask()
+        climbed: dict[str, dict[str, Any]] = {}
+        if self._wish.refine and not isinstance(answer, Stop):
+            refined = refine(drawn, planner.gains(), options, random)
+            joints_of |= {one.name: one.joints for one in refined}
+            climbed = {one.name: {"from": one.seed, "seed_gain": one.seed_gain} for one in refined}
+            if refined:
+                planner.offer(offered(refined, self._arm))
+                answer = planner.ask()
+        while not isinstance(answer, Stop):
+            name = answer.candidate.name
+            why = drawn.sieve.body.obstacle_on_path(standing, joints_of[name])
+            if why is None:
+                more: dict[str, Any] = {"turned_down": turned_down, "margin_px": drawn.sight.margin_px}
+                if name in climbed:
+                    more["refined"] = climbed[name]
+                pose = answer.candidate.T_base_flange
+                goal = self._goal(situation, pose, tuple(joints_of[name].tolist()))
+                return Step(goal, "plan", decision_of(answer, estimate, more), estimate)
+            turned_down[f"on the way: {why}"] = turned_down.get(f"on the way: {why}", 0) + 1
+            planner.give_up(name)
+            answer = planner.ask()
+        if answer.reason is StopReason.NO_CANDIDATE:
+            # An estimate too young to promise anything: widen it around the start.
+            return self._starting(situation)
+        return halt_of(answer)
+
+    def _goal(self, situation: Situation, pose: Pose, joints: tuple[float, ...]) -> Goal:
+        number, attempt = 1 + len(situation.views), 1 + len(situation.missed)
+        return Goal(f"view_{number:02d}.{attempt}", pose, joints, self._wish.speed_rad_s)
+
+    def _standing(self, situation: Situation) -> tuple[float, ...]:
+        """Return the joints where the arm stands, as far as the journal knows."""
+        for entry in reversed(situation.entries):
+            if entry.view is not None:
+                return situation.joints(entry.view)
+            if entry.moved:
+                return entry.goal_joints
+        return self._start.joints_rad

@@ -1,0 +1,139 @@
+"""What a decision of the loop may look at, and what it can be: a step, or a halt."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from handeye.planning import Proposal, Stop, StopReason
+from handeye.robots.protocol import Goal
+from handeye.session.entry import Entry
+from handeye.session.request import reach
+from handeye.solving import Estimate, Estimator, Measurements
+from handeye.types import View
+from handeye.types.kinematics import Kinematics
+
+# Views before anything is planned.
+START_VIEWS = 3
+
+
+class EndReason(StrEnum):
+    """How a run ended."""
+
+    ACCURACY_REACHED = "accuracy_reached"
+    VIEWS_TAKEN = "views_taken"
+    NO_CANDIDATE = "no_candidate"
+    NO_START = "no_start"
+    TOO_MANY_FAILURES = "too_many_failures"
+
+
+# Ends without an answer.
+FAILED = (EndReason.NO_START, EndReason.TOO_MANY_FAILURES)
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """Everything that a decision follows from, besides what was asked for.
+
+    Parameters
+    ----------
+    entries
+        All attempts so far.
+    views
+        What they brought.
+    measurements
+        Those of them to plan from: views that turned out wrong are left out.
+    estimate
+        What is believed; None after fewer than three views.
+    """
+
+    entries: tuple[Entry, ...]
+    views: tuple[View, ...]
+    measurements: Measurements
+    estimate: Estimate | None
+
+    @cached_property
+    def missed(self) -> list[Entry]:
+        """Return the attempts since the last view."""
+        missed: list[Entry] = []
+        for entry in reversed(self.entries):
+            if entry.view is not None:
+                break
+            missed.append(entry)
+        return missed[::-1]
+
+    def joints(self, view: View) -> tuple[float, ...]:
+        """Return the joints of a view; where the robot does not tell them, those that it was sent to."""
+        if view.joints_rad is not None:
+            return view.joints_rad
+        entry = next(e for e in self.entries if e.view is not None and e.view.name == view.name)
+        return entry.goal_joints
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What to do next, how it was decided, and how many seconds that took."""
+
+    goal: Goal
+    phase: str
+    decision: dict[str, Any]
+    estimate: Estimate | None
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Halt:
+    """That nothing is to be done next, and why."""
+
+    reason: EndReason
+    sentence: str
+
+
+class Chooser(Protocol):
+    """Decides what to do next; the same situation always leads to the same decision."""
+
+    @property
+    def kinematics(self) -> Kinematics | None:
+        """How the joints move the arm, in the frames of the poses that it reports; None if unknown."""
+        ...
+
+    def choose(self, situation: Situation) -> Step | Halt:
+        """Return the next step, or why there is none."""
+        ...
+
+
+def halt_of(stop: Stop) -> Halt:
+    """Return the halt that a planner's stop means."""
+    known = {
+        StopReason.ACCURACY_REACHED: EndReason.ACCURACY_REACHED,
+        StopReason.NO_CANDIDATE: EndReason.NO_CANDIDATE,
+    }
+    return Halt(known.get(stop.reason, EndReason.VIEWS_TAKEN), stop.sentence)
+
+
+def estimator_of(estimate: Estimate) -> Estimator:
+    """Return what answers with an estimate that is there already."""
+
+    def answer(measurements: Measurements, previous: Estimate | None = None) -> Estimate:
+        del measurements, previous
+        return estimate
+
+    return answer
+
+
+def decision_of(answer: Proposal, estimate: Estimate, more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return how a proposal came about, for the journal."""
+    now = reach(estimate)
+    return {
+        "predicted_gain": answer.predicted_gain,
+        "candidates": {
+            name: round(float(gain), 6)
+            for name, gain in zip(answer.names, answer.gains, strict=True)
+            if np.isfinite(gain)
+        },
+        "reach_before": {"translation_mm": now.translation_mm, "rotation_deg": now.rotation_deg},
+        **more,
+    }

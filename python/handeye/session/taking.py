@@ -1,0 +1,129 @@
+"""Doing one step: attempt it, judge what it brought, write it down."""
+
+import time
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from handeye.detection import Detection
+from handeye.errors import HandeyeError, OutputError
+from handeye.robots.protocol import Goal, Reading
+from handeye.session.attempt import Cell, Missed, Seen, attempt, encoded
+from handeye.session.deciding import Step
+from handeye.session.entry import Entry, Failure
+from handeye.session.judging import foreseen, labeled, objection
+from handeye.session.store import SessionStore
+from handeye.solving import Estimate, view_pose
+from handeye.types import View
+
+_WRITE_PAUSE_S = 0.2
+
+
+class Taker:
+    """Takes steps in a cell, and writes each into a store."""
+
+    def __init__(self, cell: Cell, store: SessionStore) -> None:
+        self._cell = cell
+        self._store = store
+
+    def take(self, step: Step) -> Entry:
+        """Attempt a step; on return what came of it is on the disk.
+
+        Raises
+        ------
+        OutputError
+            The disk does not take it, also not when asked again.
+        """
+        timings = {"decide": step.seconds}
+        digests = frozenset(e.image_digest for e in self._store.entries if e.image_digest is not None)
+        foresee = partial(foreseen, self._cell.camera, self._cell.target, step.estimate)
+        outcome = attempt(self._cell, step.goal, digests, timings, foresee)
+        if isinstance(outcome, Seen):
+            outcome = self._judged(step, outcome)
+        entry = Entry(
+            len(self._store.entries) + 1,
+            step.goal.label,
+            step.phase,
+            step.goal.T_base_flange,
+            step.goal.joints_rad or (),
+            moved=True,
+            decision=step.decision,
+            timings_s=timings,
+        )
+        image = None
+        if isinstance(outcome, Missed):
+            entry = replace(
+                entry,
+                moved=outcome.moved,
+                failure=outcome.failure,
+                detail=outcome.detail[:500],
+                image_digest=outcome.digest,
+            )
+        else:
+            view, seen = outcome
+            entry = replace(entry, view=view, detail=seen.note, image_digest=seen.digest)
+            image = None if seen.image is None else encoded(seen.image)
+        self._write(entry, image)
+        return entry
+
+    def _judged(self, step: Step, seen: Seen) -> tuple[View, Seen] | Missed:
+        cell, estimate = self._cell, step.estimate
+        name = step.goal.label.rpartition(".")[0]
+        detection = seen.detection if seen.labels_known else self._labels(seen, estimate)
+        image = None if seen.image is None else f"images/{name}.png"
+        joints = seen.reading.joints_rad
+        try:
+            view = View(
+                name,
+                seen.reading.T_base_flange,
+                detection.point_ids,
+                detection.pixels,
+                image,
+                seen.timestamp_s,
+                joints if joints is not None else self._joints_of(seen.reading, step.goal),
+            )
+            self._store.recording.with_views((*self._store.recording.views, view))
+        except HandeyeError as error:
+            return Missed(Failure.BAD_IMAGE, error.message, moved=True, digest=seen.digest)
+        why = objection(cell.camera, cell.target, view, estimate, len(self._store.recording.views))
+        if why is not None:
+            return Missed(Failure.INCONSISTENT, why, moved=True, digest=seen.digest)
+        return view, seen
+
+    def _labels(self, seen: Seen, estimate: Estimate | None) -> Detection:
+        cell = self._cell
+        views = self._store.recording.views
+        if estimate is not None:
+            A = estimate.mounting.chain(seen.reading.T_base_flange)
+            expected = estimate.X @ A @ estimate.Y
+        elif views:
+            # The first moves turn little: the board looks as it did at first.
+            expected = view_pose(cell.camera, cell.target, views[0]).T_camera_target
+        else:
+            return seen.detection
+        return labeled(cell.camera, cell.target, seen.detection, seen.reading.T_base_flange, expected)
+
+    def _joints_of(self, reading: Reading, goal: Goal) -> tuple[float, ...] | None:
+        """Return joints for a pose that came without, None where the description does not reach it."""
+        arm = self._cell.arm
+        if arm is None:
+            return None
+        start = np.array(goal.joints_rad) if goal.joints_rad is not None else None
+        found, reached = arm.inverse_all(reading.T_base_flange.matrix[np.newaxis], start, attempts=1)
+        return tuple(found[0].tolist()) if reached[0] else None
+
+    def _write(self, entry: Entry, image: bytes | None) -> None:
+        """Write an attempt down; where the disk refuses, wait and ask again before giving up."""
+        for patience in (1, 2, 0):
+            try:
+                if len(self._store.entries) >= entry.number:  # written, but the recording lagged behind
+                    return
+                if image is not None and entry.view is not None:
+                    self._store.keep_image(entry.view.name, image)
+                self._store.append(entry)
+                return
+            except OutputError:
+                if patience == 0:
+                    raise
+                time.sleep(patience * _WRITE_PAUSE_S)

@@ -1,0 +1,64 @@
+"""What a run is asked for."""
+
+from dataclasses import dataclass, field
+
+from handeye.errors import InputError
+from handeye.planning.policies import Policy
+from handeye.planning.policies.next_best_view import NextBestView
+from handeye.planning.stopping import NumberOfViews, StopRule
+from handeye.session.request import Requested
+from handeye.types.calibration import ModelName
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What is asked for.
+
+    Parameters
+    ----------
+    accuracy_mm, accuracy_deg
+        Radii within which the error shall lie with 95 % probability; None to take all views.
+    most_views
+        Stop at so many views in any case.
+    seed
+        Of every choice by chance.
+    failures_in_a_row
+        Stop after so many attempts without a view.
+    tries_at_a_place
+        Attempts at one goal where nothing says that the place is to blame.
+    speed_rad_s
+        No joint moves faster.
+    joints_err
+        Weigh noise and offsets of the joints as causes of error: the description of the arm is known anyway.
+    refine
+        Climb from the best candidates to better ones near them, rather than take the best that was drawn.
+
+    Raises
+    ------
+    InputError
+        A value out of its range.
+    """
+
+    accuracy_mm: float | None = 0.5
+    accuracy_deg: float | None = 0.05
+    most_views: int = 20
+    seed: int = 0
+    model: ModelName = ModelName.AUTO
+    failures_in_a_row: int = 10
+    tries_at_a_place: int = 3
+    speed_rad_s: float = 0.5
+    joints_err: bool = True
+    refine: bool = True
+    policy: Policy = field(default_factory=NextBestView)
+
+    def __post_init__(self) -> None:
+        self.rules()  # checks what they check
+        if not 0 < self.speed_rad_s < float("inf") or min(self.failures_in_a_row, self.tries_at_a_place) < 1:
+            raise InputError("a speed above zero and at least one attempt are needed", code="out_of_range")
+
+    def rules(self) -> tuple[StopRule, ...]:
+        """Return when to stop, in the order asked."""
+        number = NumberOfViews(self.most_views)
+        if self.accuracy_mm is None or self.accuracy_deg is None:
+            return (number,)
+        return Requested(self.accuracy_mm, self.accuracy_deg), number
