@@ -1,10 +1,14 @@
 """The twin of the paper's cell: an arm as wrong as it is said to be, and parts that are kept apart."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from handeye import _core
 from handeye.errors import InputError
+from handeye.evaluation.checkpoint import Checkpoint
 from handeye.evaluation.comparison import POLICIES
 from handeye.evaluation.studies.twin import Twin, study_twin, trajectories
 from handeye.evaluation.twin import SIZE_PX, TARGET, TwinOptions, arm_error, twin_set
@@ -85,6 +89,17 @@ def test_the_pictures_say_what_was_run(twin: Twin) -> None:
     for path in paths.values():
         assert np.array_equal([p.matrix for p in path[:3]], [p.matrix for p in paths["random"][:3]])
     assert len(trajectory_figure(twin).axes) == 3
+
+
+def test_what_was_finished_is_not_run_again(
+    twin: Twin, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def kept() -> Twin:
+        return study_twin(models=("paper",), sets=2, trials=1, options=SMALL, workers=Checkpoint(tmp_path))
+
+    assert kept().to_dict() == twin.to_dict()
+    monkeypatch.setattr(sys.modules[study_twin.__module__], "run_trial", None)
+    assert kept().to_dict() == twin.to_dict()
 
 
 def test_what_cannot_be_run_is_refused() -> None:

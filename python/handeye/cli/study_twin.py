@@ -33,6 +33,8 @@ def twin(
     render: bool = False,
     seed: int = 0,
     workers: Annotated[int | None, Parameter(show_default=False)] = None,
+    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
+    checkpoint: Path | None = None,
     output: Path | None = None,
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
@@ -57,6 +59,10 @@ def twin(
         Seed of everything random.
     workers
         Processes; all processors by default. The results do not depend on it.
+    scheduler
+        Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786.
+    checkpoint
+        Folder that keeps finished pieces: the same command goes on where it was broken off.
     output
         Folder for the pictures and the JSON object; made if it does not exist.
     """
@@ -71,7 +77,7 @@ def twin(
             trials=trials,
             options=TwinOptions(rendered=render),
             seed=seed,
-            workers=Trials(workers=workers).processes,
+            workers=Trials(workers=workers, scheduler=scheduler, checkpoint=checkpoint).crew,
             progress=advance,
         )
 

@@ -137,11 +137,13 @@ def affine(source: FloatArray, destination: FloatArray) -> tuple[FloatArray, Flo
     centre = source.mean(axis=0)
     shift = destination.mean(axis=0)
     flat = source - centre
-    (a, b), (_, d) = square = flat.T @ flat
+    square = flat.T @ flat
+    (a, b), (_, d) = square.tolist()
     determinant = a * d - b * b
-    # Points on a line leave the rest open; then the least of all answers is taken.
-    degenerate = determinant <= 1e-12 * (a + d) ** 2
-    inverse = np.linalg.pinv(square) if degenerate else np.array([[d, -b], [-b, a]]) / determinant
+    inverse = np.array([[d, -b], [-b, a]]) / (determinant or 1.0)
+    if determinant <= 1e-12 * (a + d) ** 2:
+        # Points on a line leave the rest open; then the least of all answers is taken.
+        inverse = np.asarray(np.linalg.pinv(square), dtype=np.float64)
     A = np.asarray(inverse @ (flat.T @ (destination - shift)), dtype=np.float64)
     return A, shift - centre @ A
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from handeye.errors import InputError
+from handeye.evaluation.checkpoint import Checkpoint
 from handeye.evaluation.comparison import (
     POLICIES,
     Comparison,
@@ -18,7 +19,7 @@ from handeye.evaluation.comparison import (
     run_trial,
     summary,
 )
-from handeye.evaluation.parallel import Progress, part_of, run_all
+from handeye.evaluation.parallel import Progress, Workers, part_of, run_all
 from handeye.evaluation.protocol import Protocol, Trial, draw_trials
 from handeye.evaluation.studies.curves import Curves, correlations
 from handeye.evaluation.twin import ARM, TwinOptions, TwinSet, twin_set
@@ -101,7 +102,7 @@ def study_twin(
     trials: int = 10,
     options: TwinOptions | None = None,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Twin:
     """Run 3 + 5 views of the training part of every set, and measure on its validation part.
@@ -125,7 +126,9 @@ def study_twin(
     pieces_per_set = -(-trials // TRIALS_PER_PIECE)
     total = sets * (1 + len(models) * pieces_per_set)
     make = partial(twin_set, options=options, seed=seed)
-    made = run_all(make, range(sets), workers=workers, progress=part_of(progress, 0, total))
+    # A checkpoint keeps what is measured; sets are drawn anew, they are the same.
+    makers = workers.workers if isinstance(workers, Checkpoint) else workers
+    made = run_all(make, range(sets), workers=makers, progress=part_of(progress, 0, total))
     found: dict[str, Curves] = {}
     for number, model in enumerate(models):
         comparison = _comparison(model, protocol)
