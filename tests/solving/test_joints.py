@@ -203,7 +203,7 @@ class TestPlanning:
     def test_information_of_a_candidate_is_that_of_a_view(self, mounting: Mounting) -> None:
         """Against the formula: ``B' (sigma^2 M^-1 + S)^-1 B`` with B = [I, Ad(X A), Ad(X) D]."""
         recording = simulate(ErrorKind.ENCODER, 9, CellOptions(mounting=mounting))
-        options = AutoOptions(kinematics=KNOWN, free_camera=False)
+        options = AutoOptions(kinematics=KNOWN, free_camera=False, links=False)
         estimate = AutoEstimator(options)(Measurements.of_recording(recording))
         hypothesis = estimate.hypotheses[0]
         assert hypothesis.robot_side is RobotSide.JOINTS
