@@ -6,13 +6,16 @@ use nalgebra::DMatrix;
 
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
 
+/// Neighbours in a row that every unit takes in whole vectors.
+type Block = [f64; MAX_LANES];
+
 /// `U' D^-1 U` of a positive definite matrix, `D` the diagonal of the upper triangular `U`.
 pub(crate) struct Factor {
     size: usize,
-    /// Length of a row: a multiple of every unit's lanes.
-    width: usize,
+    /// Blocks of a row.
+    blocks: usize,
     /// `U` row by row; what lies below the diagonal means nothing.
-    upper: Vec<f64>,
+    upper: Vec<Block>,
     unit: VectorUnit,
 }
 
@@ -20,19 +23,19 @@ impl Factor {
     /// By the lower triangle of a matrix; `None` if it is not positive definite or not finite.
     pub fn new(m: &DMatrix<f64>) -> Option<Self> {
         let size = m.nrows();
-        let width = size.next_multiple_of(MAX_LANES);
-        let mut upper = vec![0.0; size * width];
+        let blocks = size.div_ceil(MAX_LANES);
+        let mut upper = vec![[0.0; MAX_LANES]; size * blocks];
         // Columns of a symmetric matrix are its rows.
-        for (row, column) in upper.chunks_exact_mut(width).zip(m.as_slice().chunks_exact(size)) {
-            row[..size].copy_from_slice(column);
+        for (row, column) in upper.chunks_exact_mut(blocks).zip(m.as_slice().chunks_exact(size)) {
+            row.as_flattened_mut()[..size].copy_from_slice(column);
         }
-        let mut factor = Self { size, width, upper, unit: VectorUnit::widest() };
+        let mut factor = Self { size, blocks, upper, unit: VectorUnit::widest() };
         dispatch(factor.unit, Eliminate { factor: &mut factor }).then_some(factor)
     }
 
     /// Pivots in the order of elimination: what is left of a diagonal entry when those before it are known.
     pub fn pivots(&self) -> impl Iterator<Item = f64> {
-        self.upper.chunks_exact(self.width).enumerate().map(|(k, row)| row[k])
+        self.upper.chunks_exact(self.blocks).enumerate().map(|(k, row)| row.as_flattened()[k])
     }
 
     /// `ln |m|`.
@@ -52,13 +55,13 @@ impl Factor {
 
     /// `m^-1`; not finite where it overflows.
     pub fn inverse(&self) -> DMatrix<f64> {
-        let mut rows = vec![0.0; 2 * self.size * self.width];
-        let (lower, inverse) = rows.split_at_mut(self.size * self.width);
+        let mut rows = vec![[0.0; MAX_LANES]; 2 * self.size * self.blocks];
+        let (lower, inverse) = rows.split_at_mut(self.size * self.blocks);
         dispatch(self.unit, Invert { factor: self, lower, inverse });
         let mut matrix = DMatrix::zeros(self.size, self.size);
         let columns = matrix.as_mut_slice();
-        for (i, row) in inverse.chunks_exact(self.width).enumerate() {
-            for (j, entry) in row[..=i].iter().enumerate() {
+        for (i, row) in inverse.chunks_exact(self.blocks).enumerate() {
+            for (j, entry) in row.as_flattened()[..=i].iter().enumerate() {
                 columns[i * self.size + j] = *entry;
                 columns[j * self.size + i] = *entry;
             }
@@ -67,13 +70,15 @@ impl Factor {
     }
 }
 
-/// `row - factor * other` from the vector on that holds `from`, up to that which holds `to`.
+/// `row - factor * other`, block by block.
 #[inline(always)]
-fn take_off<S: Simd>(simd: S, row: &mut [f64], factor: f64, other: &[f64], from: usize, to: usize) {
+fn take_off<S: Simd>(simd: S, row: &mut [Block], factor: f64, other: &[Block]) {
     let factor = simd.splat(factor);
-    for at in (from / S::LANES * S::LANES..=to).step_by(S::LANES) {
-        let left = factor.neg_mul_add(simd.load(&other[at..]), simd.load(&row[at..]));
-        left.store(&mut row[at..]);
+    for (block, other) in row.iter_mut().zip(other) {
+        for at in (0..MAX_LANES).step_by(S::LANES) {
+            let left = factor.neg_mul_add(simd.load(&other[at..]), simd.load(&block[at..]));
+            left.store(&mut block[at..]);
+        }
     }
 }
 
@@ -87,16 +92,20 @@ impl Kernel for Eliminate<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> bool {
-        let Factor { size, width, upper, .. } = self.factor;
+        let Factor { size, blocks, upper, .. } = self.factor;
         for k in 0..*size {
-            let (done, rest) = upper.split_at_mut((k + 1) * *width);
-            let row = &done[k * *width..];
-            if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&row[k]) {
+            let (done, rest) = upper.split_at_mut((k + 1) * *blocks);
+            let row = &done[k * *blocks..];
+            let entries = row.as_flattened();
+            if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&entries[k]) {
                 return false;
             }
-            let inverse = 1.0 / row[k];
-            for (line, i) in rest.chunks_exact_mut(*width).zip(k + 1..) {
-                take_off(simd, line, row[i] * inverse, row, i, *size - 1);
+            let inverse = 1.0 / entries[k];
+            for (line, (i, entry)) in
+                rest.chunks_exact_mut(*blocks).zip(entries.iter().enumerate().skip(k + 1))
+            {
+                let first = i / MAX_LANES;
+                take_off(simd, &mut line[first..], entry * inverse, &row[first..]);
             }
         }
         true
@@ -106,8 +115,8 @@ impl Kernel for Eliminate<'_> {
 /// `L^-1` and `(L^-1)' D^-1 L^-1` for `U = D L'`, lower triangles row by row; both zero before.
 struct Invert<'a> {
     factor: &'a Factor,
-    lower: &'a mut [f64],
-    inverse: &'a mut [f64],
+    lower: &'a mut [Block],
+    inverse: &'a mut [Block],
 }
 
 impl Kernel for Invert<'_> {
@@ -115,18 +124,23 @@ impl Kernel for Invert<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Factor { size, width, upper, .. } = self.factor;
+        let Factor { size, blocks, upper, .. } = self.factor;
+        for (k, row) in self.lower.chunks_exact_mut(*blocks).enumerate() {
+            row.as_flattened_mut()[k] = 1.0;
+        }
         for k in 0..*size {
-            let (done, rest) = self.lower.split_at_mut(k * *width);
-            let row = &mut rest[..*width];
-            row[k] = 1.0;
-            for (j, other) in done.chunks_exact(*width).enumerate() {
-                let line = &upper[j * *width..];
-                take_off(simd, row, line[k] / line[j], other, 0, j);
+            // This row is done: off those below, which do not wait for each other.
+            let (done, rest) = self.lower.split_at_mut((k + 1) * *blocks);
+            let row = &done[k * *blocks..];
+            let line = upper[k * *blocks..].as_flattened();
+            let inverse = 1.0 / line[k];
+            let filled = k / MAX_LANES + 1;
+            for (other, entry) in rest.chunks_exact_mut(*blocks).zip(&line[k + 1..]) {
+                take_off(simd, other, entry * inverse, &row[..filled]);
             }
-            let weight = -1.0 / upper[k * *width + k];
-            for (i, sum) in self.inverse.chunks_exact_mut(*width).enumerate().take(k + 1) {
-                take_off(simd, sum, row[i] * weight, row, 0, i);
+            let sums = self.inverse.chunks_exact_mut(*blocks);
+            for (i, (sum, entry)) in sums.zip(row.as_flattened()).enumerate().take(k + 1) {
+                take_off(simd, sum, -entry * inverse, &row[..=i / MAX_LANES]);
             }
         }
     }

@@ -131,22 +131,30 @@ impl Se3 {
     /// [`Error::NotRigid`] if an entry is not finite, the last row is not `0 0 0 1`, or the
     /// rotation deviates from orthogonality by more than [`RIGID_TOLERANCE`].
     pub fn from_matrix(m: &Matrix4<f64>) -> Result<Self, Error> {
-        if !m.iter().all(|x| x.is_finite()) {
+        Self::from_row_major(m.transpose().as_slice())
+    }
+
+    /// As [`Se3::from_matrix`], from the 16 entries of the matrix row by row.
+    ///
+    /// # Errors
+    /// As [`Se3::from_matrix`], and if there are fewer entries.
+    pub fn from_row_major(entries: &[f64]) -> Result<Self, Error> {
+        let Some(m) = entries.first_chunk::<16>() else {
+            return Err(Error::NotRigid { deviation: f64::NAN });
+        };
+        if !m.iter().fold(true, |fine, x| fine & x.is_finite()) {
             return Err(Error::NotRigid { deviation: f64::NAN });
         }
-        let rotation: Matrix3<f64> = m.fixed_view::<3, 3>(0, 0).into_owned();
-        let last = m.row(3);
+        let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
         let gram = rotation.transpose() * rotation;
         let deviation = (gram - Matrix3::identity())
-            .amax()
-            .max(last[0].abs())
-            .max(last[1].abs())
-            .max(last[2].abs())
-            .max((last[3] - 1.0).abs());
+            .iter()
+            .chain(&[m[12], m[13], m[14], m[15] - 1.0])
+            .fold(0.0, |largest: f64, x| largest.max(x.abs()));
         if deviation > RIGID_TOLERANCE || rotation.determinant() < 0.0 {
             return Err(Error::NotRigid { deviation });
         }
-        let translation = m.fixed_view::<3, 1>(0, 3).into_owned();
+        let translation = Vector3::new(m[3], m[7], m[11]);
         // Newton-Schulz squares the deviation: two steps reach rounding from RIGID_TOLERANCE, without an SVD.
         let polished = |r: Matrix3<f64>, gram: Matrix3<f64>| r * (Matrix3::identity() * 1.5 - gram * 0.5);
         let mut rotation = rotation;

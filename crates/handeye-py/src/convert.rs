@@ -93,7 +93,8 @@ pub fn matrix<const R: usize, const C: usize>(
 
 /// One rigid transform out of a `(4, 4)` array.
 pub fn transform(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Se3> {
-    rigid(py, || name.to_owned(), &matrix::<4, 4>(py, name, array)?)
+    check_shape(py, name, array, &[Some(4), Some(4)])?;
+    rigid(py, || name.to_owned(), &in_place(array))
 }
 
 /// Entries of an `(N, R, C)` array in row-major order, in place where they lie that way.
@@ -110,13 +111,16 @@ pub fn row_major<'a, const R: usize, const C: usize>(
 
 /// Rigid transforms out of an `(N, 4, 4)` array; an error names the index.
 pub fn transforms(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<Vec<Se3>> {
-    let matrices = matrices::<4, 4>(py, name, array)?;
-    let one = |(i, m)| rigid(py, || format!("{name}[{i}]"), m);
-    matrices.iter().enumerate().map(one).collect()
+    let entries = row_major::<4, 4>(py, name, array)?;
+    let mut transforms = Vec::with_capacity(entries.len() / 16);
+    for (i, m) in entries.chunks_exact(16).enumerate() {
+        transforms.push(rigid(py, || format!("{name}[{i}]"), m)?);
+    }
+    Ok(transforms)
 }
 
-fn rigid(py: Python<'_>, name: impl Fn() -> String, m: &Matrix4<f64>) -> PyResult<Se3> {
-    Se3::from_matrix(m).map_err(|error| {
+fn rigid(py: Python<'_>, name: impl Fn() -> String, m: &[f64]) -> PyResult<Se3> {
+    Se3::from_row_major(m).map_err(|error| {
         let error = to_python(py, error);
         let message = format!("{} is {}", name(), error.value(py));
         match error.value(py).setattr("args", (message,)) {
