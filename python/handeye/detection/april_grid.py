@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from handeye.detection.base import Detection, Image, NotFound, Reason, inside, ordered
-from handeye.detection.corner_fit import ASTRAY_PX, CornerKind, fit_corners
+from handeye.detection.corner_fit import ASTRAY_PX, CornerKind, astray, fit_corners
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.markers import (
     LEAST_SHARE,
@@ -85,8 +85,9 @@ def confirm(image: Image, target: AprilGrid, board: Aligned) -> Detection | None
         return None
     ids = (4 * np.flatnonzero(read)[:, np.newaxis] + np.arange(4)).ravel()
     corners = places[read].reshape(-1, 2)
-    sharp = _measured(image, target, places[read], board.steps(plane[ids]), settle=True)
-    good = np.linalg.norm(sharp - corners, axis=1) <= ASTRAY_PX
+    steps = board.steps(plane[ids])
+    sharp = _measured(image, target, places[read], steps, settle=True)
+    good = ~astray(sharp, corners, target.tag_m * np.linalg.norm(steps, axis=2).min(axis=1))
     if good.sum() < max(4, LEAST_SHARE * 4 * expected.sum()):
         return None
     return ordered(target, ids[good], sharp[good])

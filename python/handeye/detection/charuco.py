@@ -13,7 +13,7 @@ from handeye.detection.base import (
     inside,
     ordered,
 )
-from handeye.detection.corner_fit import ASTRAY_PX, CornerKind, fit_corners
+from handeye.detection.corner_fit import CornerKind, astray, fit_corners
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.markers import (
     LEAST_SHARE,
@@ -105,8 +105,9 @@ def confirm(image: Image, target: Charuco, board: Aligned) -> Detection | None:
     ids = np.flatnonzero(known & seen & (board.likeness(plane) >= LEAST_LIKENESS))
     if len(ids) < FEWEST_CORNERS:
         return None
-    sharp = _measured(image, target, corners[ids], board.steps(plane[ids]), settle=True)
-    good = np.linalg.norm(sharp - corners[ids], axis=1) <= ASTRAY_PX
+    steps = board.steps(plane[ids])
+    sharp = _measured(image, target, corners[ids], steps, settle=True)
+    good = ~astray(sharp, corners[ids], target.square_m * np.linalg.norm(steps, axis=2).min(axis=1))
     if good.sum() < max(FEWEST_CORNERS, LEAST_SHARE * seen.sum()):
         return None
     return ordered(target, ids[good], sharp[good])

@@ -19,7 +19,7 @@ from handeye.detection.base import (
     ordered,
 )
 from handeye.detection.beyond import goes_on
-from handeye.detection.corner_fit import ASTRAY_PX, CornerKind, fit_corners
+from handeye.detection.corner_fit import CornerKind, astray, fit_corners
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.part import Part
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
@@ -53,7 +53,7 @@ def confirm(image: Image, target: Chessboard, board: Aligned) -> Detection | Non
         return None
     places = board.places(plane)
     corners, complete = _measured(image, target, places)
-    if not complete or np.abs(corners - places).max() > ASTRAY_PX:
+    if not complete or astray(corners, places, _edges(target, places).heights).any():
         return None
     return ordered(target, np.arange(target.point_count), corners)
 

@@ -22,8 +22,9 @@ LARGEST_RADIUS_PX = 30.0
 SMOOTHING_PX = 1.0
 # Half the width of the strip along each edge that is looked at.
 BAND_PX = 4.0
-# Corners further than this from where others put them are not what they seem.
-ASTRAY_PX = 1.5
+# Corners further than this from where others put them are not what they seem; where a board is near, so that
+# a pitch is many pixels, further than a share of it.
+ASTRAY_PX, ASTRAY_SHARE = 1.5, 0.06
 # A window is where it belongs if its corner is so near to its middle, per squared half width of the strips:
 # the wider they are, the less it matters.
 SETTLED = 0.008
@@ -38,6 +39,12 @@ class CornerKind(Enum):
     """Two dark and two light squares, diagonally equal; the light may change across the window."""
     QUADRANTS = "quadrants"
     """Four parts of any grey: the corner of a tag, with or without a square that touches it."""
+
+
+def astray(found: FloatArray, expected: FloatArray, pitches_px: FloatArray) -> NDArray[np.bool_]:
+    """Tell which corners (N, 2) are not there or too far from where they are expected; pitches are (N,)."""
+    away = np.linalg.norm(found - expected, axis=1)
+    return ~(away <= np.maximum(ASTRAY_PX, ASTRAY_SHARE * pitches_px))
 
 
 def fit_corners(

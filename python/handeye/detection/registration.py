@@ -36,7 +36,7 @@ MAX_ITERATIONS, STEP_TOLERANCE_PX = 15, 0.04
 # Correlation with the picture below which there is no use in going on.
 LEAST_CORRELATION = 0.2
 # A point is there where image and picture agree so well around it.
-LEAST_LIKENESS = 0.7
+LEAST_LIKENESS = 0.6
 # Grey of what is outside the image.
 OUTSIDE = 128
 # An image of which less is looked at than this shows nothing.
