@@ -14,7 +14,7 @@ from handeye.cli.progress import progress
 if TYPE_CHECKING:
     from rich.console import Console
 
-Name = Literal["solve", "score", "step", "memory", "scaling"]
+Name = Literal["solve", "score", "step", "loop", "memory", "scaling"]
 
 
 def bench(
@@ -26,16 +26,17 @@ def bench(
     output: Path | None = None,
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
-    """Measure solver, scorer and a whole planning step on this machine, side by side with their peers.
+    """Measure solver, scorer, a planning step and a step of the loop, side by side with their peers.
 
     All methods get the same problems and take turns in one run. Peers that are not installed are left out,
-    and it is said why; requirements/bench.txt brings SciPy, JAX, Ceres for Python and the headers of Eigen,
-    and those in C++ are compiled from benchmarks/peers where a compiler and the libraries are found.
+    and it is said why; requirements/bench.txt brings SciPy, JAX, Ceres and GTSAM for Python and the headers
+    of Eigen, and those in C++ are compiled from benchmarks/peers where a compiler and the libraries are
+    found.
 
     Parameters
     ----------
     names
-        What to measure: solve, score, step, memory, scaling; all of them by default.
+        What to measure: solve, score, step, loop, memory, scaling; all of them by default.
     budget_s
         Seconds for each method at each size.
     no_peers

@@ -92,6 +92,25 @@ def _step(found: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _loop(found: Mapping[str, Any]) -> list[str]:
+    width, height = found["image_px"]
+    rows = [
+        [name, _number(time["median_ms"]), f"{_number(time['low_ms'])} to {_number(time['high_ms'])}"]
+        for name, time in found["stages"].items()
+    ]
+    rows.append(["**sum without robot and camera**", _number(found["total_ms"]), ""])
+    what = (
+        f"Milliseconds, medians with quartiles over {found['steps']} planned steps of a simulated "
+        f"{found['arm']}: rendered pictures of {width} x {height} pixels, {found['target']} of "
+        f"{found['points']} points, links judged by capsules. Each stage without those inside it."
+    )
+    return [
+        "## A step of the closed loop",
+        what,
+        _table(["stage", "median", "quartiles"], rows),
+    ]
+
+
 def _memory(found: Mapping[str, Any]) -> list[str]:
     said = (
         f"A process that scores {found['candidates']} candidates of {found['points']} points peaks at "
@@ -127,6 +146,7 @@ _PARTS: dict[str, Callable[[Mapping[str, Any]], list[str]]] = {
     "solve": _solve,
     "score": _score,
     "step": _step,
+    "loop": _loop,
     "memory": _memory,
     "scaling": _scaling,
 }

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from handeye.evaluation.benchmarks.loop import bench_loop
 from handeye.evaluation.benchmarks.machine import describe_machine, describe_versions, one_core
 from handeye.evaluation.benchmarks.memory import bench_memory
 from handeye.evaluation.benchmarks.options import Options
@@ -17,6 +18,7 @@ BENCHMARKS: Mapping[str, Callable[[Options, Progress], dict[str, Any]]] = {
     "solve": bench_solve,
     "score": bench_score,
     "step": bench_step,
+    "loop": bench_loop,
     "memory": bench_memory,
     "scaling": bench_scaling,
 }
