@@ -46,7 +46,7 @@ def table_figure(twin: Twin) -> Figure:
             axis.bar(places, means, 0.24, yerr=errors, color=colour, alpha=0.85, ecolor="#333333", label=name,
                      error_kw={"linewidth": 0.9})  # fmt: skip
             for place, mean, error in zip(places, means, errors, strict=True):
-                axis.text(place, mean + error, f"{mean:.2g}", ha="center", va="bottom", fontsize=7)
+                axis.text(place, mean + error, f"{mean:.2g}", ha="center", va="bottom", fontsize=6)
         axis.set_xticks(range(len(twin.models)), [_MODELS[model] for model in twin.models], fontsize=8.5)
         axis.set_title(label, fontsize=10, loc="left")
         axis.spines[["top", "right"]].set_visible(False)
