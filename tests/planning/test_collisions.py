@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from handeye.errors import InputError
-from handeye.planning.collisions import Body, Workspace, _segment_distance, frames_of
+from handeye.planning.collisions import Body, Workspace, _segment_distance
 from handeye.robots import open_arm
+from handeye.robots.frames import frames_of
 
 SPACE = Workspace(np.array([-2.0, -2.0, -1.0]), np.array([2.0, 2.0, 2.0]))
 

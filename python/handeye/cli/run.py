@@ -16,6 +16,7 @@ from handeye.cli.output import check_new_folder
 from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.planning.collisions import Body
 from handeye.planning.sieve import ViewLimits
 from handeye.robots.manual import describe
 from handeye.robots.notations import Notation
@@ -23,6 +24,7 @@ from handeye.robots.protocol import Goal
 from handeye.session.attempt import Patience
 from handeye.session.configuration import (
     SIMULATED,
+    Collisions,
     Configuration,
     Prepared,
     Simulation,
@@ -68,6 +70,9 @@ class Limits:
     """Largest angle at which the target is seen."""
     margin_px: float = 20.0
     """Distance from the border of the image."""
+    collisions: Collisions = Collisions.AUTO
+    """How links are kept from touching one another: meshes (the shapes of the URDF, with the extra meshes),
+    capsules, or auto for meshes where there are any."""
 
 
 @Parameter(name="*", group="Simulated cell")
@@ -206,6 +211,7 @@ def run(
         speed_rad_s=float(np.deg2rad(limits.speed_deg_s)),
         workspace_m=_box(limits.workspace_mm),
         floor_m=limits.floor_mm / MM_PER_M,
+        collisions=limits.collisions,
         limits=ViewLimits(
             (limits.distance_mm[0] / MM_PER_M, limits.distance_mm[1] / MM_PER_M),
             float(np.deg2rad(limits.tilt_deg)),
@@ -325,13 +331,16 @@ def _plan(prepared: Prepared) -> Answer:
         raise UsageError("--dry-run shows motions, and here are none")
     goals = [
         Goal(f"view_{i:02d}.1", pose, tuple(joints.tolist()), prepared.configuration.speed_rad_s)
-        for i, (pose, joints) in enumerate(preview(start, prepared.arm, space, START_VIEWS), start=1)
+        for i, (pose, joints) in enumerate(
+            preview(start, Body(prepared.arm, space, solids=prepared.cell.solids), START_VIEWS), start=1
+        )
     ]
     data: dict[str, Any] = {
         "dry_run": True,
         "arm": prepared.arm.name,
         "workspace_mm": [(MM_PER_M * space.lower_m).tolist(), (MM_PER_M * space.upper_m).tolist()],
         "speed_deg_s": float(np.rad2deg(wish.speed_rad_s)),
+        "collisions_judged": _judged_by(prepared),
         "accuracy_mm": wish.accuracy_mm,
         "accuracy_deg": wish.accuracy_deg,
         "most_views": wish.most_views,
@@ -389,15 +398,19 @@ def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end:
         "attempts": end.attempts,
         "within_95": None if end.reach is None else vars(end.reach),
         "true_error": error,
-        "collisions_judged": (
-            "none: recorded views, nothing moved"
-            if configuration.is_replay
-            else "by capsules along the links"
-        ),
+        "collisions_judged": _judged_by(prepared),
         "seed": configuration.seed,
         "calibration": calibration.to_dict(),
     }
     return Answer(data, lambda console: _show(console, data, end, error))
+
+
+def _judged_by(prepared: Prepared) -> str:
+    if prepared.configuration.is_replay:
+        return "none: recorded views, nothing moved"
+    if prepared.cell.solids is None:
+        return "by capsules along the links"
+    return "by the shapes of the links in the description"
 
 
 def _report(folder: Path, model: ModelName) -> Path | None:

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
-from handeye.planning.collisions import frames_of
 from handeye.robots import Arm
+from handeye.robots.frames import frames_of
 from handeye.types import Camera, Pose, Target
 from handeye.types.arrays import FloatArray
 

@@ -11,12 +11,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handeye import _core
 from handeye.errors import InputError
+from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
+from handeye.robots.frames import frames_of
 from handeye.types.arrays import FloatArray, finite_array
 
 # Frames nearer to each other than this are one point.
+TOUCHES_ITSELF = "the arm would touch itself"
 _SHORTEST_LINK_M = 1e-3
 # No joint moves farther between two postures at which a path is looked at.
 _PATH_STEP_RAD = 0.05
@@ -78,11 +80,15 @@ class Body:
         Where it may be.
     tool_points_m
         (P, 3) points of the mounted things, in the flange.
+    solids
+        The shapes of the links: links are then judged by these instead of capsules, on single paths only, as
+        that takes longer.
     """
 
     arm: Arm
     workspace: Workspace
     tool_points_m: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    solids: SolidLinks | None = None
 
     def obstacles(self, joints: FloatArray) -> list[str | None]:
         """Say for each posture (N, n) what it runs into, None for nothing."""
@@ -108,14 +114,17 @@ class Body:
             elif low[k]:
                 answers.append("the arm would touch the floor")
             elif touching[k]:
-                answers.append("the arm would touch itself")
+                answers.append(TOUCHES_ITSELF)
             else:
                 answers.append(None)
         return answers
 
     def obstacle_on_path(self, start: ArrayLike, end: ArrayLike) -> str | None:
         """Say what is in the way of the straight motion in joint space from posture to posture (n,)."""
-        return self.obstacles_on_paths(start, np.asarray(end, dtype=np.float64)[np.newaxis])[0]
+        why = self.obstacles_on_paths(start, np.asarray(end, dtype=np.float64)[np.newaxis])[0]
+        if why is None and self.solids is not None and self.solids.touch(straight_path(start, end)[1:]):
+            return TOUCHES_ITSELF
+        return why
 
     def obstacles_on_paths(self, start: ArrayLike, ends: FloatArray) -> list[str | None]:
         """Say for each posture (N, n) what is in the way of the straight motion there from a posture (n,)."""
@@ -159,7 +168,7 @@ class Body:
     def _touches_itself(self, frames: FloatArray, tools: FloatArray) -> FloatArray:
         space, origins = self.workspace, frames[:, :, :3, 3]
         gaps: list[FloatArray] = []
-        if self._may_touch:
+        if self._may_touch and self.solids is None:
             (a, b), (c, d) = np.array(self._may_touch).transpose(1, 2, 0)
             gap = _segment_distance(origins[:, a], origins[:, b], origins[:, c], origins[:, d])
             gaps.append(gap - 2 * space.link_radius_m)
@@ -179,21 +188,6 @@ def straight_path(start: ArrayLike, end: ArrayLike) -> FloatArray:
     first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     count = max(2, int(np.ceil(np.abs(last - first).max() / _PATH_STEP_RAD)) + 1)
     return first + np.linspace(0, 1, count)[:, np.newaxis] * (last - first)
-
-
-def frames_of(arm: Arm, joints: ArrayLike) -> FloatArray:
-    """(N, n + 2, 4, 4) poses in the base at joints (N, n): the base itself, each joint, the flange."""
-    values = finite_array(joints, (None, len(arm)), "joints")
-    frames = np.empty((len(values), len(arm) + 2, 4, 4))
-    frames[:, 0] = np.eye(4)
-    for i, joint in enumerate(arm.joints):
-        twists = np.zeros((len(values), 6))
-        twists[:, (0 if joint.sliding else 3) : (3 if joint.sliding else 6)] = (
-            values[:, i : i + 1] * joint.axis
-        )
-        frames[:, i + 1] = frames[:, i] @ joint.placement.matrix @ _core.se3_exp(twists)
-    frames[:, -1] = frames[:, -2] @ arm.T_last_flange.matrix
-    return frames
 
 
 def _segment_distance(p0: FloatArray, p1: FloatArray, q0: FloatArray, q1: FloatArray) -> FloatArray:

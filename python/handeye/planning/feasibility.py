@@ -8,6 +8,7 @@ import numpy as np
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Body, Workspace
 from handeye.planning.sieve import Sieve, ViewLimits, mounted_points, sight_of
+from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
 from handeye.solving.estimate import Estimate, Sight
 from handeye.types import Mounting, Pose
@@ -45,6 +46,8 @@ class Generator:
         Number of draws on a shell around the target, and in joint space around postures that showed it.
     spread_rad
         Standard deviation of the joints in the latter.
+    solids
+        The shapes of the links, where they are known.
     """
 
     arm: Arm
@@ -53,10 +56,11 @@ class Generator:
     around_target: int = 600
     around_postures: int = 300
     spread_rad: float = 0.25
+    solids: SolidLinks | None = None
 
     def body(self, estimate: Estimate) -> Body:
         """Return the arm with camera or target mounted where the estimate has it."""
-        return Body(self.arm, self.workspace, mounted_points(estimate))
+        return Body(self.arm, self.workspace, mounted_points(estimate), self.solids)
 
     def draw(
         self,

@@ -31,8 +31,8 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
 
 
 @dataclass(frozen=True)
-class _Edge:
-    """A joint of the description, moving or not."""
+class Edge:
+    """A joint of a description, moving or not."""
 
     element: Element
     name: str
@@ -49,6 +49,21 @@ def read_urdf(path: str | os.PathLike[str], *, base: str | None = None, tip: str
     InputError
         The file cannot be read or used; the message names it and the place in it.
     """
+    file, content = Path(path), read_file(path)
+    try:
+        return parse_urdf(content, base=base, tip=tip)
+    except InputError as error:
+        raise InputError(f"{file}: {error.message}", code=error.code, hint=error.hint) from error
+
+
+def read_file(path: str | os.PathLike[str]) -> bytes:
+    """Return the content of a description, no more of it than is ever parsed.
+
+    Raises
+    ------
+    InputError
+        No regular file, or one that cannot be read.
+    """
     file = Path(path)
     try:
         if not stat.S_ISREG(file.stat().st_mode):
@@ -59,10 +74,7 @@ def read_urdf(path: str | os.PathLike[str], *, base: str | None = None, tip: str
         code = "missing_file" if isinstance(error, FileNotFoundError) else "unreadable"
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{str(path)[:300]}: {reason or error}", code=code) from error
-    try:
-        return parse_urdf(content, base=base, tip=tip)
-    except InputError as error:
-        raise InputError(f"{file}: {error.message}", code=error.code, hint=error.hint) from error
+    return content
 
 
 def parse_urdf(content: bytes, *, base: str | None = None, tip: str | None = None) -> Arm:
@@ -95,44 +107,46 @@ def parse_urdf(content: bytes, *, base: str | None = None, tip: str | None = Non
             code="not_urdf",
             hint="expand it first: xacro robot.urdf.xacro > robot.urdf",
         )
-    links = _links(root)
-    edges = _edges(root, links)
-    by_child = _tree(edges)
+    links = links_of(root)
+    edges = edges_of(root, links)
+    by_child = tree_of(edges)
     start = base if base is not None else _root(links, by_child)
     if start not in links:
         raise _no_link(start, links)
     end = tip if tip is not None else _tip(links, by_child, start)
     if end not in links:
         raise _no_link(end, links)
-    path = _path(by_child, start, end)
+    path = path_of(by_child, start, end)
     return _arm(root.attributes.get("name", "arm")[:100] or "arm", path, start, end)
 
 
-def _links(root: Element) -> dict[str, Element]:
+def links_of(root: Element) -> dict[str, Element]:
+    """Return the links by name."""
     links: dict[str, Element] = {}
     for element in root.all("link"):
-        name = _attribute(element, "name", "link")
+        name = attribute_of(element, "name", "link")
         if name in links:
-            raise _unusable(element, f"a second link {name!r}")
+            raise unusable(element, f"a second link {name!r}")
         links[name] = element
     if not links:
-        raise _unusable(root, "no <link>")
+        raise unusable(root, "no <link>")
     if len(links) > MAX_LINKS:
         raise InputError(f"{len(links)} links, expected at most {MAX_LINKS}", code="too_large")
     return links
 
 
-def _edges(root: Element, links: dict[str, Element]) -> list[_Edge]:
-    edges: list[_Edge] = []
+def edges_of(root: Element, links: dict[str, Element]) -> list[Edge]:
+    """Return the joints."""
+    edges: list[Edge] = []
     names: set[str] = set()
     for element in root.all("joint"):
-        name = _attribute(element, "name", "joint")
+        name = attribute_of(element, "name", "joint")
         if name in names:
-            raise _unusable(element, f"a second joint {name!r}")
+            raise unusable(element, f"a second joint {name!r}")
         names.add(name)
-        kind = _attribute(element, "type", f"joint {name!r}")
+        kind = attribute_of(element, "type", f"joint {name!r}")
         if kind not in _KNOWN:
-            raise _unusable(
+            raise unusable(
                 element, f"joint {name!r}: type {kind!r}, expected one of {', '.join(sorted(_KNOWN))}"
             )
         ends: list[str] = []
@@ -140,20 +154,20 @@ def _edges(root: Element, links: dict[str, Element]) -> list[_Edge]:
             end = element.one(role)
             link = None if end is None else end.attributes.get("link")
             if link is None:
-                raise _unusable(element, f"joint {name!r}: no <{role} link=...>")
+                raise unusable(element, f"joint {name!r}: no <{role} link=...>")
             if link not in links:
-                raise _unusable(element, f"joint {name!r}: {role} link {link[:100]!r} is not in the file")
+                raise unusable(element, f"joint {name!r}: {role} link {link[:100]!r} is not in the file")
             ends.append(link)
-        edges.append(_Edge(element, name, kind, *ends))
+        edges.append(Edge(element, name, kind, *ends))
     return edges
 
 
-def _tree(edges: list[_Edge]) -> dict[str, _Edge]:
+def tree_of(edges: list[Edge]) -> dict[str, Edge]:
     """Return the joint above each link that has one."""
-    by_child: dict[str, _Edge] = {}
+    by_child: dict[str, Edge] = {}
     for edge in edges:
         if edge.child in by_child:
-            raise _unusable(
+            raise unusable(
                 edge.element,
                 f"link {edge.child!r} hangs on two joints, {by_child[edge.child].name!r} and {edge.name!r}",
             )
@@ -164,14 +178,14 @@ def _tree(edges: list[_Edge]) -> dict[str, _Edge]:
         at = link
         while at in by_child and at not in clear:
             if at in walked:
-                raise _unusable(by_child[at].element, f"the joints go round in a circle at link {at!r}")
+                raise unusable(by_child[at].element, f"the joints go round in a circle at link {at!r}")
             walked.add(at)
             at = by_child[at].parent
         clear |= walked
     return by_child
 
 
-def _root(links: dict[str, Element], by_child: dict[str, _Edge]) -> str:
+def _root(links: dict[str, Element], by_child: dict[str, Edge]) -> str:
     roots = [name for name in links if name not in by_child]
     # A link that nothing hangs on is no arm: loose links beside one are common in hand-written files.
     parents = {edge.parent for edge in by_child.values()}
@@ -185,7 +199,7 @@ def _root(links: dict[str, Element], by_child: dict[str, _Edge]) -> str:
     return bearing[0]
 
 
-def _tip(links: dict[str, Element], by_child: dict[str, _Edge], base: str) -> str:
+def _tip(links: dict[str, Element], by_child: dict[str, Edge], base: str) -> str:
     moving = _moving_before(links, by_child, base)
     most = max(moving.values())
     if most == 0:
@@ -205,11 +219,11 @@ def _tip(links: dict[str, Element], by_child: dict[str, _Edge], base: str) -> st
     return leaves[0] if leaves else last[-1]
 
 
-def _moving_before(links: dict[str, Element], by_child: dict[str, _Edge], base: str) -> dict[str, int]:
+def _moving_before(links: dict[str, Element], by_child: dict[str, Edge], base: str) -> dict[str, int]:
     """Return the number of moving joints between the base and each link that hangs on it."""
     count: dict[str, int | None] = {base: 0}
     for link in links:
-        path: list[_Edge] = []
+        path: list[Edge] = []
         at = link
         while at not in count and at in by_child:
             path.append(by_child[at])
@@ -221,9 +235,9 @@ def _moving_before(links: dict[str, Element], by_child: dict[str, _Edge], base: 
     return {link: moving for link, moving in count.items() if moving is not None}
 
 
-def _upwards(by_child: dict[str, _Edge], base: str, tip: str) -> list[_Edge] | None:
+def _upwards(by_child: dict[str, Edge], base: str, tip: str) -> list[Edge] | None:
     """Return the joints from base to tip, None if the tip does not hang on the base."""
-    path: list[_Edge] = []
+    path: list[Edge] = []
     at = tip
     while at != base:
         edge = by_child.get(at)
@@ -234,7 +248,8 @@ def _upwards(by_child: dict[str, _Edge], base: str, tip: str) -> list[_Edge] | N
     return path[::-1]
 
 
-def _path(by_child: dict[str, _Edge], base: str, tip: str) -> list[_Edge]:
+def path_of(by_child: dict[str, Edge], base: str, tip: str) -> list[Edge]:
+    """Return the joints from base to tip."""
     path = _upwards(by_child, base, tip)
     if path is None:
         raise InputError(
@@ -245,37 +260,44 @@ def _path(by_child: dict[str, _Edge], base: str, tip: str) -> list[_Edge]:
     return path
 
 
-def _arm(name: str, path: list[_Edge], base: str, tip: str) -> Arm:
+def _arm(name: str, path: list[Edge], base: str, tip: str) -> Arm:
     joints: list[Joint] = []
     pending = Pose.identity()
     for edge in path:
-        pending = pending @ _origin(edge)
+        pending = pending @ placed(edge.element, f"joint {edge.name!r}")
         if edge.kind == "fixed":
             continue
         if edge.kind not in _MOVING:
-            raise _unusable(edge.element, f"joint {edge.name!r} is {edge.kind}: an arm has none on its way")
+            raise unusable(edge.element, f"joint {edge.name!r} is {edge.kind}: an arm has none on its way")
         if edge.element.one("mimic") is not None:
-            raise _unusable(edge.element, f"joint {edge.name!r} mimics another one")
+            raise unusable(edge.element, f"joint {edge.name!r} mimics another one")
         joints.append(_joint(edge, pending))
         pending = Pose.identity()
     return Arm(name, tuple(joints), pending, base, tip)
 
 
-def _origin(edge: _Edge) -> Pose:
-    origin = edge.element.one("origin")
+def placed(element: Element, where: str) -> Pose:
+    """Return where the origin of an element puts it.
+
+    Raises
+    ------
+    InputError
+        Numbers that are none, or in the wrong units.
+    """
+    origin = element.one("origin")
     if origin is None:
         return Pose.identity()
-    where = f"joint {edge.name!r}: origin"
-    xyz = _triple(origin, "xyz", where)
-    rpy = _triple(origin, "rpy", where)
+    where = f"{where}: origin"
+    xyz = triple(origin, "xyz", where)
+    rpy = triple(origin, "rpy", where)
     if max(map(abs, xyz)) > LONGEST_OFFSET_M:
-        raise _unusable(
+        raise unusable(
             origin,
             f"{where} xyz {xyz}: more than {LONGEST_OFFSET_M:g} m",
             "URDF lengths are metres; divide millimetres by 1000",
         )
     if max(map(abs, rpy)) > LARGEST_ANGLE_RAD:
-        raise _unusable(
+        raise unusable(
             origin, f"{where} rpy {rpy}: more than two turns", "URDF angles are radians; convert degrees"
         )
     turns = [[0.0] * 3 + [angle if i == axis else 0.0 for i in range(3)] for axis, angle in enumerate(rpy)]
@@ -283,62 +305,75 @@ def _origin(edge: _Edge) -> Pose:
     return Pose.exp([*xyz, 0, 0, 0]) @ yaw @ pitch @ roll
 
 
-def _joint(edge: _Edge, placement: Pose) -> Joint:
+def _joint(edge: Edge, placement: Pose) -> Joint:
     where = f"joint {edge.name!r}"
     axis = (1.0, 0.0, 0.0)
     element = edge.element.one("axis")
     if element is not None:
-        axis = _triple(element, "xyz", f"{where}: axis")
+        axis = triple(element, "xyz", f"{where}: axis")
         if math.hypot(*axis) < 1e-6:
-            raise _unusable(element, f"{where}: axis {axis} has no direction")
+            raise unusable(element, f"{where}: axis {axis} has no direction")
     norm = math.hypot(*axis)
     unit = (axis[0] / norm, axis[1] / norm, axis[2] / norm)
     lower, upper, velocity = _limits(edge, where)
     return Joint(edge.name, placement, unit, edge.kind == "prismatic", lower, upper, velocity)
 
 
-def _limits(edge: _Edge, where: str) -> tuple[float, float, float]:
+def _limits(edge: Edge, where: str) -> tuple[float, float, float]:
     element = edge.element.one("limit")
     if element is None:
         if edge.kind == "continuous":
             return -np.inf, np.inf, np.inf
-        raise _unusable(
+        raise unusable(
             edge.element,
             f"{where}: {edge.kind} without <limit>",
             "a joint without limits is of type continuous",
         )
     # Zero is URDF's default for both limits, and stands for unknown where a speed is meant.
-    lower, upper, velocity = (_number(element, name, where, 0.0) for name in ("lower", "upper", "velocity"))
+    lower, upper, velocity = (number_of(element, name, where, 0.0) for name in ("lower", "upper", "velocity"))
     if velocity < 0:
-        raise _unusable(element, f"{where}: a largest speed of {velocity:g}")
+        raise unusable(element, f"{where}: a largest speed of {velocity:g}")
     if edge.kind == "continuous":
         return -np.inf, np.inf, velocity or np.inf
     if lower > upper:
-        raise _unusable(element, f"{where}: limits {lower:g} to {upper:g} are not in order")
+        raise unusable(element, f"{where}: limits {lower:g} to {upper:g} are not in order")
     largest = LARGEST_TURN_RAD if edge.kind == "revolute" else LONGEST_OFFSET_M
     if max(-lower, upper) > largest:
         units = "angles are radians; convert degrees" if edge.kind == "revolute" else "lengths are metres"
-        raise _unusable(element, f"{where}: limits {lower:g} to {upper:g}", f"URDF {units}")
+        raise unusable(element, f"{where}: limits {lower:g} to {upper:g}", f"URDF {units}")
     return lower, upper, velocity or np.inf
 
 
-def _attribute(element: Element, name: str, what: str) -> str:
+def attribute_of(element: Element, name: str, what: str) -> str:
+    """Return an attribute that must be there."""
     value = element.attributes.get(name, "").strip()
     if not value or len(value) > 300 or not value.isprintable():
-        raise _unusable(element, f"{what}: attribute {name!r} is missing, too long or not printable")
+        raise unusable(element, f"{what}: attribute {name!r} is missing, too long or not printable")
     return value
 
 
-def _triple(element: Element, name: str, where: str) -> tuple[float, float, float]:
-    text = element.attributes.get(name, "0 0 0")
-    parts = text.split() if len(text) < 300 else []
-    if len(parts) != 3:
-        raise _unusable(element, f"{where} {name}={text[:60]!r}, expected three numbers")
-    x, y, z = (_spelled(element, part, f"{where} {name}") for part in parts)
+def triple(element: Element, name: str, where: str) -> tuple[float, float, float]:
+    """Return an attribute of three numbers, zero by default."""
+    x, y, z = numbers_of(element, name, where, 3, (0.0, 0.0, 0.0))
     return x, y, z
 
 
-def _number(element: Element, name: str, where: str, default: float) -> float:
+def numbers_of(
+    element: Element, name: str, where: str, count: int, default: tuple[float, ...]
+) -> tuple[float, ...]:
+    """Return an attribute of so many numbers."""
+    text = element.attributes.get(name)
+    if text is None:
+        return default
+    parts = text.split() if len(text) < 60 * count else []
+    if len(parts) != count:
+        words = {1: "one number", 2: "two numbers", 3: "three numbers"}.get(count, f"{count} numbers")
+        raise unusable(element, f"{where} {name}={text[:60]!r}, expected {words}")
+    return tuple(_spelled(element, part, f"{where} {name}") for part in parts)
+
+
+def number_of(element: Element, name: str, where: str, default: float) -> float:
+    """Return an attribute that is a number."""
     text = element.attributes.get(name)
     return default if text is None else _spelled(element, text.strip(), f"{where}: {name}")
 
@@ -346,11 +381,12 @@ def _number(element: Element, name: str, where: str, default: float) -> float:
 def _spelled(element: Element, text: str, where: str) -> float:
     value = float(text) if len(text) < 60 and _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value):
-        raise _unusable(element, f"{where}: {text[:60]!r} is no finite number")
+        raise unusable(element, f"{where}: {text[:60]!r} is no finite number")
     return value
 
 
-def _unusable(element: Element, what: str, hint: str | None = None) -> InputError:
+def unusable(element: Element, what: str, hint: str | None = None) -> InputError:
+    """Return what to raise where an element cannot be used."""
     return InputError(f"line {element.line}: {what}", code="unusable_urdf", hint=hint)
 
 

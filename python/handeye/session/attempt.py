@@ -12,6 +12,7 @@ from handeye.cameras.protocol import Frame, Grey, ImageSource
 from handeye.detection import Detection, NotFound, Prediction, Reason, detect
 from handeye.errors import DeviceError, HandeyeError
 from handeye.planning.collisions import Workspace
+from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.robots.replay import is_near
@@ -76,6 +77,8 @@ class Cell:
         As calibrated and as printed.
     confirm
         Asked before every motion; False to leave it.
+    solids
+        Shapes of the arm's links, where they are known.
     """
 
     robot: Robot
@@ -86,6 +89,7 @@ class Cell:
     target: Target
     patience: Patience = field(default_factory=Patience)
     confirm: Callable[[Goal], bool] | None = None
+    solids: SolidLinks | None = None
 
     def stop(self) -> None:
         """Stop the arm through its driver; a driver that fails even then stops nothing else."""

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from handeye.planning import Planner, PlannerOptions, Stop, StopReason
-from handeye.planning.collisions import Workspace
+from handeye.planning.collisions import Body, Workspace
 from handeye.planning.feasibility import Generator
 from handeye.planning.refinement import offered, refine
 from handeye.planning.sieve import ViewLimits
+from handeye.planning.solids import SolidLinks
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
@@ -38,6 +39,8 @@ class ArmChooser:
         What is asked for.
     limits
         What makes a view usable.
+    solids
+        The shapes of the links; None to judge them by capsules.
     """
 
     def __init__(
@@ -48,11 +51,13 @@ class ArmChooser:
         start: Start,
         wish: Wish,
         limits: ViewLimits | None = None,
+        solids: SolidLinks | None = None,
     ) -> None:
-        self._arm, self._workspace, self._camera = arm, workspace, camera
+        self._arm, self._camera = arm, camera
+        self._body = Body(arm, workspace, solids=solids)
         self._start = start
         self._wish = wish
-        self._generator = Generator(arm, workspace, limits or ViewLimits())
+        self._generator = Generator(arm, workspace, limits or ViewLimits(), solids=solids)
 
     @property
     def kinematics(self) -> ArmKinematics:
@@ -102,7 +107,7 @@ class ArmChooser:
                     "camera sees the whole target, and begin anew",
                 )
         places = len({entry.goal_joints for entry in missed})
-        found = starting_goal(self._start, views, places, self._camera, self._arm, self._workspace)
+        found = starting_goal(self._start, views, places, self._camera, self._body)
         if found is None:
             return Halt(
                 EndReason.NO_START if estimate is None else EndReason.NO_CANDIDATE,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Any
 
 import msgspec
@@ -14,9 +15,11 @@ from handeye.importing import SourceOptions, open_folder
 from handeye.planning.collisions import Workspace
 from handeye.planning.policies import make_policy
 from handeye.planning.sieve import ViewLimits
-from handeye.robots import Arm, open_arm
+from handeye.planning.solids import SolidLinks
+from handeye.robots import Arm, open_arm, shipped_arms
 from handeye.robots.protocol import Goal
 from handeye.robots.replay import ReplayRobot
+from handeye.robots.shapes import read_shapes
 from handeye.robots.simulated import ArmErrors, SimulatedArm
 from handeye.session.attempt import Cell, Patience
 from handeye.session.choosing import ArmChooser
@@ -34,6 +37,15 @@ from handeye.types.calibration import ModelName
 from handeye.types.plain import read_document
 
 SIMULATED = "simulated"
+
+
+class Collisions(StrEnum):
+    """By what it is judged whether the links of an arm touch one another."""
+
+    AUTO = "auto"
+    """Their shapes where the description and the extra `meshes` have them, capsules otherwise."""
+    MESHES = "meshes"
+    CAPSULES = "capsules"
 
 
 @dataclass(frozen=True)
@@ -62,6 +74,8 @@ class Configuration:
         Specifications of the drivers, see `handeye.session.drivers`.
     workspace_m
         Corners of the box that no motion may leave; None only for a simulated cell.
+    collisions
+        What links are judged by; once a session has begun it is no longer `auto`.
     start_rad
         Joints to start from, for an arm that is simulated; others start where they stand.
     """
@@ -82,6 +96,7 @@ class Configuration:
     refine: bool = True
     workspace_m: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     floor_m: float = 0.0
+    collisions: Collisions = Collisions.AUTO
     limits: ViewLimits = field(default_factory=ViewLimits)
     patience: Patience = field(default_factory=Patience)
     simulation: Simulation = field(default_factory=Simulation)
@@ -200,7 +215,8 @@ class Prepared:
             return RecordedChooser(self.recorded, wish, cell.arm)
         if cell.workspace is None or self.start is None:
             raise InputError("a workspace and where the arm stands are needed", code="missing_value")
-        return ArmChooser(self.arm, cell.workspace, cell.camera, self.start, wish, self.configuration.limits)
+        limits = self.configuration.limits
+        return ArmChooser(self.arm, cell.workspace, cell.camera, self.start, wish, limits, cell.solids)
 
 
 def prepare(
@@ -236,15 +252,19 @@ def prepare(
     if configuration.robot is None:
         raise InputError("no arm is named", code="missing_value", hint="only a replay does without")
     arm = open_arm(configuration.robot)
+    solids = _solids(configuration, arm)
+    configuration = replace(
+        configuration, collisions=Collisions.CAPSULES if solids is None else Collisions.MESHES
+    )
     if configuration.is_simulated:
-        return _simulated(configuration, arm, target, confirm)
+        return _simulated(configuration, arm, target, confirm, solids)
     if camera is None or target is None:
         raise InputError("a real cell needs camera and target", code="missing_value")
     workspace = configuration.workspace()
     person = person or Person(_nobody, lambda _: None)
     robot = open_robot(configuration.driver, person)
     source = open_camera(configuration.images, robot, person)
-    cell = Cell(robot, source, arm, workspace, camera, target, configuration.patience, confirm)
+    cell = Cell(robot, source, arm, workspace, camera, target, configuration.patience, confirm, solids)
     if start is None:
         reading = cell.read()
         joints = reading.joints_rad or tuple(arm.inverse(reading.T_base_flange).tolist())
@@ -360,8 +380,35 @@ def _replayed(
     return Prepared(configuration, cell, None, recording, source.truth, recorded=source.views)
 
 
+def _solids(configuration: Configuration, arm: Arm) -> SolidLinks | None:
+    """Return the shapes of the links as far as they are wanted and known.
+
+    Raises
+    ------
+    InputError
+        They are asked for and cannot be had.
+    """
+    wanted = Collisions(configuration.collisions)
+    if configuration.robot is None or wanted is Collisions.CAPSULES:
+        return None
+    try:
+        if configuration.robot in shipped_arms():
+            raise InputError(
+                f"{configuration.robot}: the shipped description has no shapes", code="no_shapes"
+            )
+        return SolidLinks(arm, read_shapes(configuration.robot, arm))
+    except InputError:
+        if wanted is Collisions.MESHES:
+            raise
+        return None
+
+
 def _simulated(
-    configuration: Configuration, arm: Arm, target: Target | None, confirm: Callable[[Goal], bool] | None
+    configuration: Configuration,
+    arm: Arm,
+    target: Target | None,
+    confirm: Callable[[Goal], bool] | None,
+    solids: SolidLinks | None,
 ) -> Prepared:
     wrong = configuration.simulation
     look = Appearance(blur_px=wrong.blur_px, noise=wrong.pixel_noise)
@@ -382,7 +429,15 @@ def _simulated(
     cell = made.cell
     workspace = cell.workspace if configuration.workspace_m is None else configuration.workspace()
     cell = Cell(
-        cell.robot, cell.source, arm, workspace, cell.camera, cell.target, configuration.patience, confirm
+        cell.robot,
+        cell.source,
+        arm,
+        workspace,
+        cell.camera,
+        cell.target,
+        configuration.patience,
+        confirm,
+        solids,
     )
     return Prepared(configuration, cell, made.start, made.recording, made.truth, made.hidden_arm)
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handeye.planning.collisions import Body, Workspace
-from handeye.robots import Arm
+from handeye.planning.collisions import Body
 from handeye.types import Camera, Pose, View
 from handeye.types.arrays import FloatArray
 
@@ -43,7 +42,7 @@ class Start:
 
 
 def starting_goal(
-    start: Start, views: Sequence[View], failures: int, camera: Camera, arm: Arm, workspace: Workspace
+    start: Start, views: Sequence[View], failures: int, camera: Camera, body: Body
 ) -> tuple[Pose, FloatArray] | None:
     """Return the next safe pose and its joints, None if there is none.
 
@@ -53,12 +52,14 @@ def starting_goal(
         Views so far.
     failures
         Attempts at the next view that failed since the last view.
+    body
+        The arm, of which it is not known yet what is mounted on it.
     """
     if not views:
         return start.T_base_flange, np.array(start.joints_rad)
     if len(views) >= MOST_VIEWS:
         return None
-    body = Body(arm, workspace)
+    arm = body.arm
     for trial in range(failures, failures + 6):
         pose = start.T_base_flange @ Pose.exp(_twist(views, trial, camera))
         joints, reached = arm.inverse_all(pose.matrix[np.newaxis], np.array(start.joints_rad), attempts=1)
@@ -67,10 +68,10 @@ def starting_goal(
     return None
 
 
-def preview(start: Start, arm: Arm, workspace: Workspace, count: int) -> list[tuple[Pose, FloatArray]]:
+def preview(start: Start, body: Body, count: int) -> list[tuple[Pose, FloatArray]]:
     """Return the first poses and joints as they will be if there is much room around the target."""
     found = [(start.T_base_flange, np.array(start.joints_rad))]
-    body = Body(arm, workspace)
+    arm = body.arm
     for number in range(1, count):
         for trial in range(6):
             pose = start.T_base_flange @ Pose.exp(_turn(number, trial, LARGEST_TILT_RAD))
