@@ -118,7 +118,10 @@ class ViewLine(Part):
     used: bool
     reason: str
     points: int | None = None
-    rmse_px: Annotated[float | None, Meta(description="with the robot's pose as reported")] = None
+    rmse_px: Annotated[
+        float | None,
+        Meta(description="with the robot's pose as reported, put right by what was found of a known arm"),
+    ] = None
     own_rmse_px: Annotated[float | None, Meta(description="with the pose that fits this image best")] = None
     robot_off_mm: Annotated[
         float | None,

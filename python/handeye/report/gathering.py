@@ -19,6 +19,7 @@ from handeye.report.regions import USUAL_DISTANCES_M, at_points, position_axes, 
 from handeye.report.solved import Solved
 from handeye.report.views import ViewPicture, view_lines, view_picture
 from handeye.solving import Measurements, calibrate_examined
+from handeye.solving.estimate import corrected
 from handeye.solving.mistakes import examine
 from handeye.types import Camera, Mounting, Pose, Recording, Target
 from handeye.types.calibration import MM_PER_M, Calibration, ModelName
@@ -124,7 +125,8 @@ def gather_recording(
         recording.target,
         tuple((view.name, view.T_base_flange, flags.get(view.name, False)) for view in recording.views),
     )
-    pictures = tuple(view_picture(calibration, measurements, view) for view in measurements.views)
+    put_right = corrected(measurements, kinematics, calibration.arm_correction)
+    pictures = tuple(view_picture(calibration, put_right, view) for view in put_right.views)
     return Gathered(numbers, scene, pictures)
 
 

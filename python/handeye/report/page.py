@@ -17,10 +17,19 @@ from handeye.types import Pose, Target
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _MOUNTINGS = {"eye_in_hand": "camera in the hand", "eye_to_hand": "camera beside the robot"}
-_SIDES = {"none": "nowhere: its poses are exact", "flange": "at the flange", "base": "at the base"}
+_SIDES = {
+    "none": "nowhere: its poses are exact",
+    "flange": "at the flange",
+    "base": "at the base",
+    "joints": "in the joints",
+    "links": "in where the joints sit on their links",
+}
 _SUSPECTS = {
     "robot_flange": "error of the robot, at the flange",
     "robot_base": "error of the robot, at the base",
+    "robot_joint_noise": "noise of the joints",
+    "robot_joint_offsets": "offsets of the joints",
+    "robot_links": "joints that sit wrongly on their links",
     "camera": "error of the camera's calibration",
     "board_scale": "error of the size of the board",
 }
@@ -73,6 +82,7 @@ def _context(gathered: Gathered) -> dict[str, Any]:
         "camera_sentence": _camera_sentence(r),
         "model_sentence": _model_sentence(r),
         "robot_sentence": _robot_sentence(r),
+        "poses_used": _poses_used(r),
         "evidence": [(_SIDES.get(side, side), share) for side, share in r.noise.evidence.items()],
         "suspects": _suspects(r),
         "curves": _curves(r),
@@ -161,12 +171,18 @@ def _model_sentence(r: Report) -> str:
     return "auto: the noise of robot and camera is weighed by what the data say"
 
 
+def _poses_used(r: Report) -> str:
+    if "links" in r.noise.evidence:
+        return "as reported, put right by what was found of the arm's joints and links"
+    return "as reported"
+
+
 def _robot_sentence(r: Report) -> str:
     if r.noise.robot_side == "none":
         return "its poses are taken as exact" if r.model == "paper" else "none that the views would show"
     return (
         f"{figures(r.noise.robot_translation_mm, 2)} mm and {figures(r.noise.robot_rotation_deg, 2)} deg per "
-        f"axis, acting at the {r.noise.robot_side}"
+        f"axis, {_SIDES.get(r.noise.robot_side, r.noise.robot_side)}"
     )
 
 

@@ -69,7 +69,7 @@ def view_lines(calibration: Calibration, measurements: Measurements) -> list[Vie
 
 
 def view_picture(calibration: Calibration, measurements: Measurements, view: View) -> ViewPicture:
-    """Return the residuals of a view at the answer, with the robot's pose as reported.
+    """Return the residuals of a view at the answer, with the robot's pose as the view has it.
 
     Points that the answer puts out of the lens's sight are left out.
     """

@@ -193,7 +193,6 @@ class AutoEstimator:
         )
         sigma_px = np.sqrt(posterior.variances_px2)
         X, Y = Pose(posterior.x), Pose(posterior.y)
-        displaced = np.array(posterior.link_twists)
         noise = replace(_noise(sigma_px, hypotheses, arm), smooth_probability=posterior.smooth_probability)
         return Estimate(
             mounting=mounting,
@@ -215,8 +214,10 @@ class AutoEstimator:
             kinematics=options.kinematics,
             free_joints=() if arm is None else arm.free,
             joint_offsets=() if arm is None else arm.offsets(posterior.joint_offsets, posterior.covariance),
-            link_errors=() if links is None else links.named(displaced),
-            arm_correction=None if arm is None else (arm.all_offsets(posterior.joint_offsets), displaced),
+            link_errors=() if links is None else links.named(np.array(posterior.link_twists)),
+            arm_correction=None
+            if arm is None
+            else arm.correction(posterior.joint_offsets, posterior.link_twists),
         )
 
 

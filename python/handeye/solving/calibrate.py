@@ -138,6 +138,7 @@ def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibratio
         degrees_of_freedom=estimate.degrees_of_freedom,
         joint_offsets=estimate.joint_offsets,
         link_errors=estimate.link_errors,
+        arm_correction=estimate.arm_correction,
     )
 
 

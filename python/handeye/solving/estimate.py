@@ -10,7 +10,15 @@ from handeye import _core
 from handeye.errors import DegenerateError
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import JointOffset, LinkError, ModelName, Noise, RobotSide, Unobservable
+from handeye.types.calibration import (
+    ArmCorrection,
+    JointOffset,
+    LinkError,
+    ModelName,
+    Noise,
+    RobotSide,
+    Unobservable,
+)
 from handeye.types.camera import Camera
 from handeye.types.kinematics import Kinematics
 from handeye.types.mounting import Mounting
@@ -110,8 +118,7 @@ class Estimate:
     link_errors
         How the joints of a known arm most likely sit on their links; empty without one.
     arm_correction
-        The same for `Kinematics.motion_jacobians` and `link_jacobians`: offsets (n,) of all joints, and
-        displacements (m,) of all links.
+        The same as arrays; None without an arm.
     unobservable
         Directions of X and Y that the views leave open; a weak prior stands in for them.
     """
@@ -136,7 +143,7 @@ class Estimate:
     free_joints: tuple[int, ...] = ()
     joint_offsets: tuple[JointOffset, ...] = ()
     link_errors: tuple[LinkError, ...] = ()
-    arm_correction: tuple[FloatArray, FloatArray] | None = None
+    arm_correction: ArmCorrection | None = None
 
     @property
     def determined(self) -> bool:
@@ -197,22 +204,8 @@ class Estimate:
         )
 
     def corrected(self, measurements: Measurements) -> Measurements:
-        """Return measurements with robot poses as the arm stands by what is known of it.
-
-        As they are where the arm is not known, or a view has no joint positions.
-        """
-        if self.kinematics is None or self.arm_correction is None:
-            return measurements
-        if any(view.joints_rad is None for view in measurements.views):
-            return measurements
-        offsets, links = self.arm_correction
-        twists = self.kinematics.motion_jacobians(self.mounting, measurements.joints) @ offsets
-        twists += self.kinematics.link_jacobians(self.mounting, measurements.joints) @ links
-        motions = _core.se3_exp(twists) @ measurements.motions
-        # What leads from a robot pose to A leads back.
-        poses = [self.mounting.chain(Pose(motion)) for motion in motions]
-        views = zip(measurements.views, poses, strict=True)
-        return replace(measurements, views=tuple(replace(view, T_base_flange=pose) for view, pose in views))
+        """Return measurements with robot poses as the arm stands by what is known of it; see `corrected`."""
+        return corrected(measurements, self.kinematics, self.arm_correction)
 
     def _robot_error(self, hypothesis: Hypothesis) -> tuple[str | None, FloatArray | None]:
         """Side of the chain and root (6, 6) of the covariance of the robot's error; None if it has none."""
@@ -294,6 +287,25 @@ class Estimate:
                 (Pose.exp(signed[:6]) @ self.X, Pose.exp(signed[6:]) @ self.Y) for signed in (step, -step)
             ]
         return points
+
+
+def corrected(
+    measurements: Measurements, kinematics: Kinematics | None, correction: ArmCorrection | None
+) -> Measurements:
+    """Return measurements with robot poses as the arm stands by what was found of its joints and links.
+
+    As they are where the arm is not known, or a view has no joint positions.
+    """
+    if kinematics is None or correction is None or any(v.joints_rad is None for v in measurements.views):
+        return measurements
+    mounting, joints = measurements.mounting, measurements.joints
+    twists = kinematics.motion_jacobians(mounting, joints) @ correction.joint_offsets
+    twists += kinematics.link_jacobians(mounting, joints) @ correction.displacements
+    motions = _core.se3_exp(twists) @ measurements.motions
+    # What leads from a robot pose to A leads back.
+    poses = [mounting.chain(Pose(motion)) for motion in motions]
+    views = zip(measurements.views, poses, strict=True)
+    return replace(measurements, views=tuple(replace(view, T_base_flange=pose) for view, pose in views))
 
 
 class Estimator(Protocol):

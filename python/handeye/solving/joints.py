@@ -17,7 +17,7 @@ from handeye import _core
 from handeye.errors import InputError
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import JointOffset
+from handeye.types.calibration import ArmCorrection, JointOffset
 from handeye.types.kinematics import Kinematics
 from handeye.types.mounting import Mounting
 
@@ -91,11 +91,14 @@ class JointModel:
         """Standard deviation of each joint at a level of the noise, radians or metres; empty for none."""
         return tuple((self.scales * joint_rad).tolist()) if joint_rad > 0 else ()
 
-    def all_offsets(self, values: list[float]) -> FloatArray:
-        """(n,) offsets of all joints, zero where they are no parameters."""
-        offsets = np.zeros(len(self.scales))
-        offsets[list(self.free)] = values
-        return offsets
+    def correction(self, offsets: list[float], displacements: list[float]) -> ArmCorrection:
+        """Return what was found of the joints and, unless they were left out, of the links."""
+        every = np.zeros(len(self.scales))
+        every[list(self.free)] = offsets
+        moved: FloatArray = np.zeros(self.kinematics.link_twists.shape[2])
+        if displacements:
+            moved[:] = displacements
+        return ArmCorrection(every, moved)
 
     def offsets(self, values: list[float], covariance: FloatArray) -> tuple[JointOffset, ...]:
         """Name the offsets; their covariance is the last block of that of all parameters."""

@@ -132,6 +132,22 @@ class LinkError:
         }
 
 
+@dataclass(frozen=True, eq=False)
+class ArmCorrection:
+    """What puts the poses of a known arm right: see `Kinematics`.
+
+    Parameters
+    ----------
+    joint_offsets
+        (n,) by how much the joints stand beyond where they are read, radians and metres.
+    displacements
+        (m,) how the joints are displaced on their links, metres and radians.
+    """
+
+    joint_offsets: FloatArray
+    displacements: FloatArray
+
+
 @dataclass(frozen=True)
 class Finding:
     """One thing that a diagnosis has to say: a stable code, a sentence, and the numbers behind it."""
@@ -195,6 +211,8 @@ class Calibration:
     link_errors
         How the joints most likely sit on their links, where the arm's kinematics were given and the views
         say so. The hand-eye is then that of the arm as it is, not of the poses as reported.
+    arm_correction
+        What puts the poses of a known arm right; None without one.
     degrees_of_freedom
         Degrees of freedom of the noise levels behind the covariance; infinite if they were given. Regions
         take quantiles of F(6, degrees of freedom) in place of chi-square.
@@ -219,6 +237,7 @@ class Calibration:
     degrees_of_freedom: float = float("inf")
     joint_offsets: tuple[JointOffset, ...] = ()
     link_errors: tuple[LinkError, ...] = ()
+    arm_correction: ArmCorrection | None = None
 
     @property
     def results(self) -> dict[str, Pose]:
