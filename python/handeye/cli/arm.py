@@ -17,12 +17,12 @@ class ArmSource:
     """Which arm it is; every view must then have joint positions."""
 
     robot: Annotated[
-        str | None, Parameter(help="Name of an arm (epson_c4l, lbr_iiwa_14, ur5e) or URDF file.")
+        str | None, Parameter(help="Name of an arm (epson_c4l, lbr_iiwa_14, ur5e), URDF or MJCF file.")
     ] = None
     robot_base: str | None = None
     """Link of the URDF at its base, where its root is not."""
     robot_tip: str | None = None
-    """Link of the URDF whose pose is reported, where the last one is not."""
+    """Link, or in MJCF body or site, whose pose is reported, where the last one is not."""
 
     def kinematics(self, recording: Recording, model: ModelName) -> ArmKinematics | None:
         """Return the kinematics of the arm in the frames of the recording's poses, None if no arm is named.

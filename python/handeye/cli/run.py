@@ -143,8 +143,8 @@ def run(
     session
         Folder to write; a new one, or with --resume the one to go on with.
     robot
-        Description of the arm: a shipped arm (epson_c4l, ur5e, lbr_iiwa_14) or a URDF file. Without one
-        epson_c4l, or in a replay none.
+        Description of the arm: a shipped arm (epson_c4l, ur5e, lbr_iiwa_14), a URDF or an MJCF file. Without
+        one epson_c4l, or in a replay none.
     driver
         What moves it: simulated, manual (a person; manual:kuka for another notation), replay:FOLDER (nothing;
         the views of a recording are the candidates), or a driver of another package with its address.

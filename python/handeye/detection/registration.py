@@ -23,7 +23,7 @@ Grey = NDArray[np.float32]
 
 # Pixels of the squared picture for a square's side, a circle's radius and a marker's bit.
 SQUARE_PX, RADIUS_PX, BIT_PX = 8.0, 3.0, 1.3
-LARGEST_PICTURE_PX = 120_000
+LARGEST_PICTURE_PX = 40_000
 # Light margin around what is printed, and what is looked at around that, in pitches.
 MARGIN, SURROUNDINGS = 0.35, 1.6
 # The light around a place is that of so many pitches.
@@ -102,7 +102,9 @@ class Printed:
     @cached_property
     def inverse(self) -> FloatArray:
         """(8, 8) inverse of the normal equations over all pixels."""
-        return np.asarray(np.linalg.inv(self.steepest @ self.steepest.T), dtype=np.float64)
+        return np.asarray(
+            np.linalg.pinv((self.steepest @ self.steepest.T).astype(np.float64)), dtype=np.float64
+        )
 
     def pixels(self, plane: FloatArray) -> FloatArray:
         """Return where places (..., 2) of the plane, metres, are in the picture."""

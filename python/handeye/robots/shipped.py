@@ -5,8 +5,10 @@ from importlib import resources
 from pathlib import Path
 
 from handeye.errors import InputError
+from handeye.robots.mjcf import parse_mjcf
 from handeye.robots.model import Arm
-from handeye.robots.urdf import parse_urdf, read_urdf
+from handeye.robots.urdf import parse_urdf, read_file, read_urdf
+from handeye.robots.xml_tree import read_xml
 
 _SUFFIX = ".urdf"
 
@@ -20,14 +22,14 @@ def shipped_arms() -> tuple[str, ...]:
 
 
 def open_arm(name_or_file: str | os.PathLike[str], *, base: str | None = None, tip: str | None = None) -> Arm:
-    """Return an arm of this package by its name, or one from a URDF file.
+    """Return an arm of this package by its name, or one from a URDF or MJCF file.
 
     Parameters
     ----------
     name_or_file
-        One of `shipped_arms()`, or a path; anything with a separator or ending in .urdf is a path.
+        One of `shipped_arms()`, or a path; anything with a separator or ending in .urdf or .xml is a path.
     base, tip
-        Links at the ends of the arm, as in `parse_urdf`.
+        Links at the ends of the arm, as in `parse_urdf`; MJCF has no other base than the world.
 
     Raises
     ------
@@ -40,9 +42,24 @@ def open_arm(name_or_file: str | os.PathLike[str], *, base: str | None = None, t
         file = resources.files("handeye.robots") / "arms" / f"{text}{_SUFFIX}"
         return parse_urdf(file.read_bytes(), base=base, tip=tip)
     if Path(text).suffix or os.sep in text or (os.altsep is not None and os.altsep in text):
-        return read_urdf(text, base=base, tip=tip)
+        return _read(text, base, tip)
     raise InputError(
         f"no arm {text[:100]!r}",
         code="unknown_arm",
         hint=f"the arms are {', '.join(names)}; or give a .urdf file",
     )
+
+
+def _read(path: str, base: str | None, tip: str | None) -> Arm:
+    """Read a description by what its file holds."""
+    if Path(path).suffix != ".xml":
+        return read_urdf(path, base=base, tip=tip)
+    content = read_file(path)
+    try:
+        if read_xml(content).tag != "mujoco":
+            return parse_urdf(content, base=base, tip=tip)
+        if base is not None:
+            raise InputError("the base of an arm in MJCF is the world", code="unknown_link")
+        return parse_mjcf(content, tip=tip)
+    except InputError as error:
+        raise InputError(f"{path}: {error.message}", code=error.code, hint=error.hint) from error
