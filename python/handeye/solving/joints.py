@@ -95,10 +95,8 @@ class JointModel:
         """Return what was found of the joints and, unless they were left out, of the links."""
         every = np.zeros(len(self.scales))
         every[list(self.free)] = offsets
-        moved: FloatArray = np.zeros(self.kinematics.link_twists.shape[2])
-        if displacements:
-            moved[:] = displacements
-        return ArmCorrection(every, moved)
+        ways = int(self.kinematics.link_twists.shape[2])
+        return ArmCorrection(every, np.array(displacements or [0.0] * ways, dtype=float))
 
     def offsets(self, values: list[float], covariance: FloatArray) -> tuple[JointOffset, ...]:
         """Name the offsets; their covariance is the last block of that of all parameters."""
