@@ -160,8 +160,6 @@ impl Se3 {
         let mut rotation = rotation;
         if deviation > 1e-15 {
             rotation = polished(rotation, gram);
-        }
-        if deviation > 1e-9 {
             rotation = polished(rotation, rotation.transpose() * rotation);
         }
         Ok(Self::new(rotation, translation))
