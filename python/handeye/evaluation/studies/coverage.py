@@ -43,7 +43,7 @@ CASES = (
     Case("wrong_intrinsics", ErrorKind.WRONG_INTRINSICS, modelled=False),
     Case("encoder_arm_unknown", ErrorKind.ENCODER, modelled=False),
     Case("joint_offsets_arm_unknown", ErrorKind.JOINT_OFFSETS, modelled=False),
-    Case("smooth_kinematic_arm_known", ErrorKind.SMOOTH_KINEMATIC, arm_known=True, modelled=False),
+    Case("smooth_kinematic_arm_known", ErrorKind.SMOOTH_KINEMATIC, arm_known=True),
 )
 
 
