@@ -29,7 +29,7 @@ def turning(count: int = 3) -> Arm:
 
 
 def test_balls_touch_where_their_distance_says() -> None:
-    pytest.importorskip("fcl")
+    pytest.importorskip("fcl", reason="the extra meshes is not installed")
     arm = turning()
     # One in the base at the origin, one at the end: the arm folds back on itself.
     shapes = [
@@ -48,8 +48,8 @@ def test_balls_touch_where_their_distance_says() -> None:
 
 
 def test_boxes_cylinders_and_meshes(tmp_path: Path) -> None:
-    pytest.importorskip("fcl")
-    pytest.importorskip("trimesh")
+    pytest.importorskip("fcl", reason="the extra meshes is not installed")
+    pytest.importorskip("trimesh", reason="the extra meshes is not installed")
     arm = turning()
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     faces = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4)]
@@ -88,7 +88,7 @@ def _reach(arm: Arm, place: np.ndarray) -> np.ndarray:
 
 
 def test_a_path_is_judged_by_shapes_where_there_are_any() -> None:
-    pytest.importorskip("fcl")
+    pytest.importorskip("fcl", reason="the extra meshes is not installed")
     arm = turning()
     shapes = [
         Shape("base", 0, Pose.identity(), "sphere", (0.2,)),
@@ -107,7 +107,7 @@ def test_a_path_is_judged_by_shapes_where_there_are_any() -> None:
 
 
 def test_links_that_always_touch_are_left_out_and_none_is_an_error() -> None:
-    pytest.importorskip("fcl")
+    pytest.importorskip("fcl", reason="the extra meshes is not installed")
     arm = turning()
     huge = [
         Shape("base", 0, Pose.identity(), "sphere", (10.0,)),
@@ -127,8 +127,8 @@ def test_without_shapes_capsules_are_said_to_be_used() -> None:
 
 
 def test_a_loop_with_the_meshes_of_a_ur5e(tmp_path: Path) -> None:
-    pytest.importorskip("fcl")
-    models = pytest.importorskip("airo_models")
+    pytest.importorskip("fcl", reason="the extra meshes is not installed")
+    models = pytest.importorskip("airo_models", reason="the extra ur5e is not installed")
     file = models.get_urdf_path("ur5e")
     prepared = prepare(configured(5, robot=file, most_views=5))
     assert prepared.configuration.collisions is Collisions.MESHES

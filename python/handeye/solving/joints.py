@@ -68,17 +68,14 @@ class JointModel:
             )
         jacobians = kinematics.motion_jacobians(measurements.mounting, measurements.joints)
         scales = np.where(kinematics.sliding, SLIDING_M_PER_RAD, 1.0)
-        at_flange = jacobians
-        if measurements.mounting is Mounting.EYE_TO_HAND:
-            at_flange = _core.se3_adjoint(np.linalg.inv(measurements.motions)) @ jacobians
-        squares = np.mean(np.sum(np.square(at_flange * scales), axis=2), axis=0)
+        lever_m, turn = deviation_at_flange(measurements, jacobians * scales)
         return cls(
             kinematics,
             jacobians,
             scales,
             tuple(range(1, count - 1)),
-            float(np.sqrt(squares[:3].sum() / 3)),
-            float(np.sqrt(squares[3:].sum() / 3)),
+            lever_m,
+            turn,
         )
 
     def errors(self, noise_rad: float | None, offset_rad: float | None) -> _core.JointErrors:
@@ -106,3 +103,14 @@ class JointModel:
             JointOffset(names[joint], float(value), float(sigma), sliding[joint])
             for joint, value, sigma in zip(self.free, values, sigmas, strict=True)
         )
+
+
+def deviation_at_flange(measurements: Measurements, twists: FloatArray) -> tuple[float, float]:
+    """Return the deviation per axis of the flange's translation and rotation, on average over the views.
+
+    `twists` (K, 6, m): what one standard deviation of each of m errors does to A on its left.
+    """
+    if measurements.mounting is Mounting.EYE_TO_HAND:
+        twists = _core.se3_adjoint(np.linalg.inv(measurements.motions)) @ twists
+    squares = np.mean(np.sum(np.square(twists), axis=2), axis=0)
+    return float(np.sqrt(squares[:3].mean())), float(np.sqrt(squares[3:].mean()))

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye import _core
+from handeye.solving.joints import deviation_at_flange
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import LinkError
 from handeye.types.kinematics import Kinematics
-from handeye.types.mounting import Mounting
 
 # Displacements of less are not worth a line: nothing is known of the links.
 LEAST_M, LEAST_RAD = 1e-6, 1e-6
@@ -34,22 +34,21 @@ class LinkModel:
         (K, 6, m) L of each view.
     lengths
         (m,) whether each way of displacing is in metres.
+    measurements
+        The views.
     """
 
     kinematics: Kinematics
     jacobians: FloatArray
     lengths: tuple[bool, ...]
-    _at_flange: FloatArray
+    measurements: Measurements
 
     @classmethod
     def of(cls, kinematics: Kinematics, measurements: Measurements) -> "LinkModel":
         """Take the joint positions of the views; they must have been checked."""
         jacobians = kinematics.link_jacobians(measurements.mounting, measurements.joints)
-        at_flange = jacobians
-        if measurements.mounting is Mounting.EYE_TO_HAND:
-            at_flange = _core.se3_adjoint(np.linalg.inv(measurements.motions)) @ jacobians
         displaced = np.abs(kinematics.link_twists[:, :3]).sum(axis=(0, 1)) > 0
-        return cls(kinematics, jacobians, tuple(displaced.tolist()), at_flange)
+        return cls(kinematics, jacobians, tuple(displaced.tolist()), measurements)
 
     def errors(self) -> _core.LinkErrors:
         """Return the errors as the core takes them."""
@@ -58,8 +57,7 @@ class LinkModel:
     def at_flange(self, translation_m: float, rotation_rad: float) -> tuple[float, float]:
         """Return the deviation per axis of the flange's translation and rotation, on average over views."""
         levels = np.where(self.lengths, translation_m, rotation_rad)
-        squares = np.mean(np.sum(np.square(self._at_flange * levels), axis=2), axis=0)
-        return float(np.sqrt(squares[:3].mean())), float(np.sqrt(squares[3:].mean()))
+        return deviation_at_flange(self.measurements, self.jacobians * levels)
 
     def named(self, values: FloatArray) -> tuple[LinkError, ...]:
         """Return how each joint sits, of the ways (m,) of displacing them; nothing where that is nothing."""

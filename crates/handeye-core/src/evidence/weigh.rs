@@ -42,9 +42,7 @@ impl View {
         let of_causes = [part(left, 0), part(left, 3), part(right, 0), part(right, 3), of_joints];
         Self { rows, of_pixels: triangle(of_pixels), of_causes, maps: *maps }
     }
-}
 
-impl View {
     /// `[I, Ad(X A), camera, joint offsets, e]`, six rows.
     pub fn rows(&self) -> &DMatrix<f64> {
         &self.rows
