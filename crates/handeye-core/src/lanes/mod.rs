@@ -7,6 +7,7 @@
 mod factor;
 mod lens;
 mod moments;
+mod plane_moments;
 mod symmetric;
 mod transform;
 
@@ -15,6 +16,7 @@ use crate::simd::{Simd, Vector};
 pub(crate) use factor::{factorise, log_pivots};
 pub(crate) use lens::{Bent, Window, bend};
 pub(crate) use moments::Sums;
+pub(crate) use plane_moments::PlaneMoments;
 pub(crate) use symmetric::{UPPER, upper};
 pub(crate) use transform::{entries, left_product, right_product};
 

@@ -132,38 +132,4 @@ impl<V: Vector> Sums<V> {
         m[upper(5, 5)] = a.mul_add(self.xx, self.yy);
         m
     }
-
-    /// Products, divided by `f_x`, of the twist's columns with that of a camera parameter: `f_x`, `f_y`, `c_x` or `c_y`.
-    /// `cubes` are the sums of `x^3` and `y^3`.
-    #[inline(always)]
-    pub fn with_camera<S: Simd<Vector = V>>(
-        &self,
-        simd: S,
-        parameter: usize,
-        aspect: f64,
-        count: V,
-        cubes: [V; 2],
-    ) -> [V; 6] {
-        let zero = simd.splat(0.0);
-        let a = simd.splat(aspect);
-        match parameter {
-            0 => [self.xw, zero, -self.xxw, -self.xxy, self.x + cubes[0], -self.xy],
-            1 => [zero, a * self.yw, -(a * self.yyw), -(a * (self.y + cubes[1])), a * self.xyy, a * self.xy],
-            2 => [self.w, zero, -self.xw, -self.xy, count + self.xx, -self.y],
-            _ => [zero, a * self.w, -(a * self.yw), -(a * (count + self.yy)), a * self.xy, a * self.x],
-        }
-    }
-
-    /// Products of the columns of two camera parameters, `i <= j`.
-    #[inline(always)]
-    pub fn of_camera<S: Simd<Vector = V>>(&self, simd: S, i: usize, j: usize, count: V) -> V {
-        match (i, j) {
-            (0, 0) => self.xx,
-            (0, 2) => self.x,
-            (1, 1) => self.yy,
-            (1, 3) => self.y,
-            (2, 2) | (3, 3) => count,
-            _ => simd.splat(0.0),
-        }
-    }
 }

@@ -9,6 +9,7 @@ use std::arch::x86_64::{
     _mm256_permute2f128_pd, _mm256_set1_pd, _mm256_sqrt_pd, _mm256_srli_epi64, _mm256_storeu_pd,
     _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd, _mm256_xor_pd,
 };
+use std::hint::black_box;
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
 use super::{Kernel, Mask, Simd, Vector};
@@ -35,8 +36,15 @@ pub(super) fn run<K: Kernel>(simd: Avx2, kernel: K) -> K::Output {
 
 #[target_feature(enable = "avx2,fma")]
 fn enter<K: Kernel>(simd: Avx2, kernel: K) -> K::Output {
+    // What does not fit into registers goes to the stack: aligned, it never lies across two cache lines.
+    let frame = Aligned(0);
+    black_box(&frame);
     kernel.run(simd)
 }
+
+/// Makes a function align its frame as vectors are.
+#[repr(align(32))]
+struct Aligned(#[expect(dead_code, reason = "takes a place")] u8);
 
 #[derive(Clone, Copy)]
 pub(super) struct Doubles(__m256d);

@@ -9,6 +9,7 @@ use std::arch::x86_64::{
     _mm512_reduce_add_pd, _mm512_set_epi64, _mm512_set1_pd, _mm512_sqrt_pd, _mm512_storeu_pd, _mm512_sub_pd,
     _mm512_unpackhi_pd, _mm512_unpacklo_pd,
 };
+use std::hint::black_box;
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
 use super::{Kernel, Mask, Simd, Vector};
@@ -40,8 +41,15 @@ pub(super) fn run<K: Kernel>(simd: Avx512, kernel: K) -> K::Output {
 
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
 fn enter<K: Kernel>(simd: Avx512, kernel: K) -> K::Output {
+    // What does not fit into registers goes to the stack: aligned, it never lies across two cache lines.
+    let frame = Aligned(0);
+    black_box(&frame);
     kernel.run(simd)
 }
+
+/// Makes a function align its frame as vectors are.
+#[repr(align(64))]
+struct Aligned(#[expect(dead_code, reason = "takes a place")] u8);
 
 #[derive(Clone, Copy)]
 pub(super) struct Doubles(__m512d);

@@ -32,73 +32,74 @@ impl Kernel for Determinant<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
+        let constant: &[f64; UPPER] = self.form.constant.first_chunk().expect("six rows");
         for at in (0..BLOCK).step_by(S::LANES) {
             let mut s = [simd.splat(0.0); UPPER];
-            for (entry, constant) in s.iter_mut().zip(&self.form.constant) {
-                *entry = simd.splat(*constant);
+            for i in 0..UPPER {
+                s[i] = simd.splat(constant[i]);
             }
             if let Some(moved) = &self.form.moved {
                 let u = spread(simd, moved, &load(simd, &self.block.before_y, at));
                 add_square(&u, &mut s);
             }
             let mut m = [simd.splat(0.0); UPPER];
-            for i in 0..6 {
-                let row = &self.block.information[packed(self.size, i, i)..];
-                for j in i..6 {
-                    m[upper(i, j)] = simd.load(&row[j - i][at..]);
+            each!(I in [0 1 2 3 4 5] {
+                let row = &self.block.information[packed(self.size, I, I)..][..6 - I];
+                for j in I..6 {
+                    m[upper(I, j)] = simd.load(&row[j - I][at..]);
                 }
-            }
+            });
             determinant(simd, s, simd.splat(self.scale), m).store(&mut self.out[at..]);
         }
     }
 }
 
-/// `U = offset + Ad(T) root`, with `Ad(T) = [R, [t]R; 0, R]`.
-#[expect(clippy::reversed_empty_ranges, reason = "unrolled: the last steps have nothing left to do")]
+/// `U = offset + Ad(T) root`, with `Ad(T) = [R, [t]R; 0, R]` and a root that is an upper triangle, so that the lower
+/// left of `U` is that of the offset.
 #[inline(always)]
 pub(super) fn spread<S: Simd>(simd: S, moved: &Moved, t: &[S::Vector; 12]) -> [[S::Vector; 6]; 6] {
     let zero = simd.splat(0.0);
     let mut u = [[zero; 6]; 6];
     macro_rules! rotated {
-        // Entry `(i, j)` of `R` times rows `$from..$from + 3` of the root, from row `$first` of these on.
-        ($i:expr, $j:expr, $from:literal, $first:expr, $start:expr) => {{
+        // Entry `(i, j)` of `R` times rows `$from..$from + 3` of the root, of which only `$rows` count.
+        ($i:expr, $j:expr, $from:literal, $rows:expr, $start:expr) => {{
             let mut sum = $start;
-            for k in $first..3 {
+            for k in $rows {
                 sum = t[3 * $i + k].mul_add(simd.splat(moved.root[$from + k][$j]), sum);
             }
             sum
         }};
     }
-    // Lower rows: R [G21 G22].
+    // R G22, the lower right.
     let mut low = [[zero; 6]; 3];
     each!(I in [0 1 2] {
-        each!(J in [0 1 2] { low[I][J] = rotated!(I, J, 3, 0, zero); });
-        each!(J in [3 4 5] { low[I][J] = rotated!(I, J, 3, J - 3, zero); });
+        each!(J in [3 4 5] { low[I][J] = rotated!(I, J, 3, 0..J - 2, zero); });
     });
     each!(I in [0 1 2] {
-        // t x (column of the lower rows)
         const A: usize = (I + 1) % 3;
         const B: usize = (I + 2) % 3;
-        each!(J in [0 1 2 3 4 5] {
-            let mut sum = simd.splat(moved.offset[I][J]);
-            if J < 3 {
-                sum = rotated!(I, J, 0, J, sum);
-            }
-            sum = t[9 + A].mul_add(low[B][J], sum);
-            u[I][J] = t[9 + B].neg_mul_add(low[A][J], sum);
+        each!(J in [0 1 2] {
+            u[I][J] = rotated!(I, J, 0, 0..=J, simd.splat(moved.offset[I][J]));
+            u[I + 3][J] = simd.splat(moved.offset[I + 3][J]);
+        });
+        each!(J in [3 4 5] {
+            // t x (column of R G22)
+            let sum = rotated!(I, J, 0, 0..3, simd.splat(moved.offset[I][J]));
+            u[I][J] = t[9 + B].neg_mul_add(low[A][J], t[9 + A].mul_add(low[B][J], sum));
             u[I + 3][J] = low[I][J] + simd.splat(moved.offset[I + 3][J]);
         });
     });
     u
 }
 
-/// Adds `U U'` to a symmetric matrix.
+/// Adds `U U'` to a symmetric matrix, but for what is constant in its lower right: see [`Moved`].
 #[inline(always)]
 pub(super) fn add_square<V: Vector>(u: &[[V; 6]; 6], s: &mut [V; UPPER]) {
     each!(I in [0 1 2 3 4 5] {
+        const FIRST: usize = if I < 3 { 0 } else { 3 };
         for j in I..6 {
             let mut sum = s[upper(I, j)];
-            for (a, b) in u[I].iter().zip(&u[j]) {
+            for (a, b) in u[I][FIRST..].iter().zip(&u[j][FIRST..]) {
                 sum = a.mul_add(*b, sum);
             }
             s[upper(I, j)] = sum;

@@ -8,7 +8,7 @@ use crate::simd::{Kernel, Mask, Simd, Vector};
 /// Doubles of a homogeneous 4 x 4 matrix.
 pub(super) const MATRIX: usize = 16;
 
-/// A rotation that deviates by less is used as it is.
+/// A rotation that deviates by less, root of the sum of squares, is used as it is.
 const ROUNDING: f64 = 1e-14;
 
 /// Puts a block of motions, row-major 4 x 4 matrices, at its places in front of the target.
@@ -48,33 +48,37 @@ impl Kernel for Approach<'_> {
     }
 }
 
-/// Repairs rounding in the rotations as [`Se3::from_matrix`] does; false if one is not rigid.
+/// Repairs rounding in the rotations as [`Se3::from_matrix`] does; false if one is not rigid, or hardly.
 #[inline(always)]
 fn repair<S: Simd>(simd: S, motion: &mut [S::Vector; 12], last: &[S::Vector; 4]) -> bool {
     let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
-    let mut gram = columns_squared(motion);
-    for i in [0, 3, 5] {
-        gram[i] = gram[i] - one;
-    }
-    // Not a number where a translation is not finite.
-    let mut largest = (motion[9] * zero + motion[10] * zero + motion[11] * zero).abs();
-    let mut rigid = simd.splat(RIGID_TOLERANCE).at_least(largest);
-    for deviation in
-        [gram[0], gram[1], gram[2], gram[3], gram[4], gram[5], last[0], last[1], last[2], last[3] - one]
-    {
-        rigid = rigid & simd.splat(RIGID_TOLERANCE).at_least(deviation.abs());
-        largest = largest.max(deviation.abs());
-    }
     let r = &*motion;
-    let minors = [r[4] * r[8] - r[5] * r[7], r[5] * r[6] - r[3] * r[8], r[3] * r[7] - r[4] * r[6]];
-    let determinant = r[0].mul_add(minors[0], r[1].mul_add(minors[1], r[2] * minors[2]));
-    if !(rigid & determinant.greater(zero)).all() {
+    // A rotation's first two columns are of unit length and square to each other, and the third is their product.
+    let deviations = [
+        r[0].mul_add(r[0], r[3].mul_add(r[3], r[6].mul_add(r[6], -one))),
+        r[1].mul_add(r[1], r[4].mul_add(r[4], r[7].mul_add(r[7], -one))),
+        r[0].mul_add(r[1], r[3].mul_add(r[4], r[6] * r[7])),
+        r[6].mul_add(r[4], r[3].neg_mul_add(r[7], r[2])),
+        r[0].mul_add(r[7], r[6].neg_mul_add(r[1], r[5])),
+        r[3].mul_add(r[1], r[0].neg_mul_add(r[4], r[8])),
+        last[0],
+        last[1],
+        last[2],
+        last[3] - one,
+    ];
+    // Not a number where a translation is not finite.
+    let mut squared = r[9].mul_add(zero, r[10].mul_add(zero, r[11] * zero));
+    for deviation in deviations {
+        squared = deviation.mul_add(deviation, squared);
+    }
+    if simd.splat(ROUNDING * ROUNDING).at_least(squared).all() {
+        return true;
+    }
+    if !simd.splat(RIGID_TOLERANCE * RIGID_TOLERANCE).at_least(squared).all() {
         return false;
     }
-    if !simd.splat(ROUNDING).at_least(largest).all() {
-        newton_schulz(simd, motion);
-        newton_schulz(simd, motion);
-    }
+    newton_schulz(simd, motion);
+    newton_schulz(simd, motion);
     true
 }
 

@@ -1,5 +1,7 @@
 //! A block of candidates as structure of arrays: the desk that the stages of the scorer hand on.
 
+use std::ops::{Deref, DerefMut};
+
 use crate::lanes::UPPER;
 use crate::simd::MAX_LANES;
 
@@ -12,6 +14,36 @@ pub(super) type Row = [f64; BLOCK];
 /// Rotation row by row, then translation.
 pub(super) type Transforms = [Row; 12];
 
+/// Rows as many as wanted, none of whose vectors lies across two cache lines.
+pub(super) struct Rows {
+    values: Vec<f64>,
+    start: usize,
+}
+
+impl Rows {
+    fn new(count: usize) -> Self {
+        let values = vec![0.0; count * BLOCK + MAX_LANES];
+        let start = values.as_ptr().align_offset(size_of::<f64>() * MAX_LANES);
+        Self { values, start }
+    }
+}
+
+impl Deref for Rows {
+    type Target = [Row];
+
+    #[inline(always)]
+    fn deref(&self) -> &[Row] {
+        self.values[self.start..].as_chunks().0
+    }
+}
+
+impl DerefMut for Rows {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [Row] {
+        self.values[self.start..].as_chunks_mut().0
+    }
+}
+
 #[repr(C, align(64))]
 pub(super) struct Block {
     /// `X A`, which carries twists of `Y` into the camera frame.
@@ -19,7 +51,7 @@ pub(super) struct Block {
     /// `T_camera_target = X A Y`.
     pub pose: Transforms,
     /// Information of `[eta; c]`, upper triangle row by row, up to a factor common to all candidates.
-    pub information: Vec<Row>,
+    pub information: Rows,
     /// Features in sight.
     pub seen: Row,
     /// `|I + M S|`.
@@ -35,7 +67,7 @@ impl Block {
         Self {
             before_y: [ZERO; 12],
             pose: [ZERO; 12],
-            information: vec![ZERO; size * (size + 1) / 2],
+            information: Rows::new(size * (size + 1) / 2),
             seen: ZERO,
             with: ZERO,
             without: ZERO,

@@ -4,7 +4,7 @@
 //! `[A w, B w, -s w, -(y s + B), A + x s, B x - A y]`, `s = x A + y B`.
 
 use super::block::{BLOCK, Block};
-use super::target::Target;
+use super::target::{Patch, Target};
 use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
 use crate::lanes::{UPPER, Window, bend, load, store, upper};
 use crate::simd::{Kernel, Simd, Vector};
@@ -47,13 +47,13 @@ fn sum<S: Simd, const RATIONAL: bool, const PRISM: bool>(
     let one = simd.splat(1.0);
     let mut sums = [zero; UPPER];
     let mut seen = zero;
-    for line in &target.lines {
-        let (line_y, line_z) = (simd.splat(line.y), simd.splat(line.z));
+    for (line_y, line_z, line_x) in target.patches.iter().flat_map(Patch::lines) {
+        let (line_y, line_z) = (simd.splat(line_y), simd.splat(line_z));
         let start_x = pose[1].mul_add(line_y, pose[2].mul_add(line_z, pose[9]));
         let start_y = pose[4].mul_add(line_y, pose[5].mul_add(line_z, pose[10]));
         let start_z = pose[7].mul_add(line_y, pose[8].mul_add(line_z, pose[11]));
-        for along in &line.x {
-            let along = simd.splat(*along);
+        for along in line_x {
+            let along = simd.splat(along);
             let depth = pose[6].mul_add(along, start_z);
             let w = one / depth;
             let x = pose[0].mul_add(along, start_x) * w;

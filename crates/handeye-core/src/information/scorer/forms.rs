@@ -36,11 +36,12 @@ pub(super) struct Form {
     pub moved: Option<Box<Moved>>,
 }
 
-/// `U = [offset + C root; pixel]`, but for the constant `pixel pixel'`.
+/// `U = [offset + C root; pixel]`. What no motion moves in `U U'` is among the constants: `pixel pixel'`, and the square
+/// of the offset's lower left, where `C root` is zero.
 pub(super) struct Moved {
     /// 6 x 6, row by row.
     pub offset: [[f64; 6]; 6],
-    /// Lower triangle, 6 x 6, row by row.
+    /// Upper triangle, 6 x 6, row by row.
     pub root: [[f64; 6]; 6],
     /// One row per pixel parameter.
     pub pixel: Vec<[f64; 6]>,
@@ -139,10 +140,10 @@ pub(super) fn predicted(
         of_eta += lost.transpose() * lost;
         of_y += square(root);
     }
-    let root = of_y.cholesky().ok_or_else(singular)?.l();
-    let offset = root.solve_lower_triangular(&cross.transpose()).ok_or_else(singular)?.transpose();
+    let root = positive_upper_root(&of_y).ok_or_else(singular)?;
+    let offset = root.solve_upper_triangular(&cross.transpose()).ok_or_else(singular)?.transpose();
     let with_y = covariance.view((6, CHAIN), (6, pixel_parameters)).into_owned();
-    let pixel = root.solve_lower_triangular(&with_y).ok_or_else(singular)?.transpose();
+    let pixel = root.solve_upper_triangular(&with_y).ok_or_else(singular)?.transpose();
 
     let size = 6 + pixel_parameters;
     let mut constant = DMatrix::zeros(size, size);
@@ -166,11 +167,11 @@ fn without_chain(of_rest: &DMatrix<f64>, left: &Matrix6<f64>) -> Form {
         return form(&constant, None);
     }
     // Null columns of the root go with nothing.
-    let root = lower_root(of_y);
+    let root = upper_root(of_y);
     let mut pixel = of_rest.view((6, 0), (size - 6, 6)).into_owned();
-    for j in 0..6 {
+    for j in (0..6).rev() {
         for i in 0..size - 6 {
-            let before: f64 = (0..j).map(|k| pixel[(i, k)] * root[(j, k)]).sum();
+            let before: f64 = (j + 1..6).map(|k| pixel[(i, k)] * root[(j, k)]).sum();
             let pivot = root[(j, j)];
             pixel[(i, j)] = if pivot > 0.0 { (pixel[(i, j)] - before) / pivot } else { 0.0 };
         }
@@ -182,6 +183,13 @@ fn without_chain(of_rest: &DMatrix<f64>, left: &Matrix6<f64>) -> Form {
 fn form(constant: &DMatrix<f64>, moved: Option<(&Matrix6<f64>, &Matrix6<f64>, &DMatrix<f64>)>) -> Form {
     let size = constant.nrows();
     let rows = |m: &Matrix6<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
+    let mut constant = constant.clone();
+    if let Some((offset, _, _)) = moved {
+        let still = offset.fixed_view::<3, 3>(3, 0);
+        let mut of_rotation = constant.fixed_view_mut::<3, 3>(3, 3);
+        of_rotation += still * still.transpose();
+    }
+    let constant = &constant;
     Form {
         size,
         constant: (0..size).flat_map(|i| (i..size).map(move |j| constant[(i, j)])).collect(),
@@ -195,27 +203,34 @@ fn form(constant: &DMatrix<f64>, moved: Option<(&Matrix6<f64>, &Matrix6<f64>, &D
     }
 }
 
-/// `L` with `L L' = m` for a positive semi-definite `m`: Cholesky that leaves null columns zero.
-fn lower_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
+/// Upper triangle `G` with `G G' = m` for a positive semi-definite `m`: Cholesky from the last column on that leaves null
+/// columns zero.
+fn upper_root(mut m: DMatrix<f64>) -> DMatrix<f64> {
     let n = m.nrows();
     let floor: Vec<f64> = (0..n).map(|i| 1e-13 * m[(i, i)].abs()).collect();
-    for j in 0..n {
+    for j in (0..n).rev() {
         let pivot = m[(j, j)];
         let inverse = if pivot > floor[j] && pivot > 0.0 { 1.0 / pivot.sqrt() } else { 0.0 };
-        for i in j..n {
+        for i in 0..=j {
             m[(i, j)] *= inverse;
         }
-        for k in j + 1..n {
+        for k in 0..j {
             let f = m[(k, j)];
-            for i in k..n {
+            for i in 0..=k {
                 m[(i, k)] -= m[(i, j)] * f;
             }
         }
-        for i in 0..j {
+        for i in j + 1..n {
             m[(i, j)] = 0.0;
         }
     }
     m
+}
+
+/// The same for a positive definite `m`.
+fn positive_upper_root(m: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    let turned = |m: &Matrix6<f64>| Matrix6::from_fn(|i, j| m[(5 - i, 5 - j)]);
+    Some(turned(&turned(m).cholesky()?.l()))
 }
 
 fn square(root: &Matrix6<f64>) -> Matrix6<f64> {

@@ -187,30 +187,38 @@ impl<'a> Scorer<'a> {
                 dispatch(self.unit, $kernel::<$($flag),*> { parameters, window, target, block })
             };
         }
-        macro_rules! see_pinhole {
-            ($camera:literal) => {{
-                let (focal, columns) = ([parameters[0], parameters[1]], &self.columns);
-                dispatch(self.unit, Pinhole::<$camera> { focal, columns, window, target, block })
-            }};
-        }
         macro_rules! see_wide {
             ($($flag:literal),*) => {{
                 let columns = &self.columns;
                 dispatch(self.unit, WidePoints::<$($flag),*> { parameters, columns, window, target, block })
             }};
         }
+        let bends = !matches!(self.model.camera.lens, Lens::Pinhole | Lens::KannalaBrandt);
+        if !bends && self.inform_of_plane(window, target, block) {
+            return;
+        }
         match (self.model.camera.lens, self.columns.is_empty()) {
-            (Lens::Pinhole | Lens::KannalaBrandt, true) => see_pinhole!(false),
-            (Lens::Pinhole | Lens::KannalaBrandt, false) if self.columns.iter().all(Column::is_of_camera) => {
-                see_pinhole!(true);
-            }
             (Lens::Pinhole | Lens::KannalaBrandt, false) => see_wide!(false, false, false),
-            (Lens::BrownConrady4 | Lens::BrownConrady5, true) => see!(Distorted, false, false),
+            (Lens::Pinhole | Lens::KannalaBrandt | Lens::BrownConrady4 | Lens::BrownConrady5, true) => {
+                see!(Distorted, false, false);
+            }
             (Lens::BrownConrady4 | Lens::BrownConrady5, false) => see_wide!(true, false, false),
             (Lens::BrownConrady8, true) => see!(Distorted, true, false),
             (Lens::BrownConrady12, true) => see!(Distorted, true, true),
             (Lens::BrownConrady8 | Lens::BrownConrady12, false) => see_wide!(true, true, true),
         }
+    }
+
+    /// The same for a lens that leaves points where they are; false where it takes other means.
+    fn inform_of_plane(&self, window: &Window, target: &Target, block: &mut Block) -> bool {
+        let Some(plane_z) = target.plane_z else { return false };
+        let columns = &self.columns;
+        let focal = [0, 1].map(|i| self.model.camera.parameters[i]);
+        if columns.is_empty() {
+            return dispatch(self.unit, Pinhole::<false> { focal, columns, window, target, plane_z, block });
+        }
+        columns.iter().all(Column::is_of_camera)
+            && dispatch(self.unit, Pinhole::<true> { focal, columns, window, target, plane_z, block })
     }
 
     fn inform_one_by_one(&self, block: &mut Block, sums: &mut Sums) {

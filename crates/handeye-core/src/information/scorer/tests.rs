@@ -288,6 +288,32 @@ fn sums_of_few_monomials_serve_the_camera_too() {
     }
 }
 
+/// Where all points lie on one line of the image, or nearly.
+#[test]
+fn boards_are_seen_from_the_side_too() {
+    for pixel in [false, true] {
+        let random = &mut Random::new(31);
+        let mut scene = Scene::new(random, Lens::Pinhole, 0, false, 0.0);
+        if pixel {
+            let prior_information = DMatrix::zeros(2, 2);
+            let camera = vec![0, 2];
+            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false, prior_information });
+            scene.belief = scene.start();
+        }
+        for round in 0..60 {
+            let slant = [0.0, 1e-8, 1e-5, 3e-4, 1e-2, 0.1][round % 6];
+            let tilt = Vector6::new(0.0, 0.0, 0.0, std::f64::consts::FRAC_PI_2 - slant, 0.0, 0.0);
+            let roll = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, random.uniform(-3.0, 3.0));
+            let mut view = Se3::exp(&roll) * Se3::exp(&tilt);
+            view.translation = view.rotation * -Vector3::new(0.06, 0.045, 0.0);
+            view.translation.z += random.uniform(0.4, 0.9);
+            scene.motions.push(scene.x.inverse() * view * scene.y.inverse());
+        }
+        let gains = scene.check(&Entropy, 1e-9).unwrap();
+        assert!(gains.iter().filter(|g| g.is_finite()).count() > 40);
+    }
+}
+
 #[test]
 fn a_mean_over_suppositions_is_the_mean_of_each() {
     for lens in [Lens::Pinhole, Lens::BrownConrady5, Lens::KannalaBrandt] {

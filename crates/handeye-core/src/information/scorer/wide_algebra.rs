@@ -49,7 +49,7 @@ impl<const CAPACITY: usize, const PACKED: usize> Kernel for Wide<'_, CAPACITY, P
         };
         let mut observed_rows = [[zero; CAPACITY]; ROWS];
         for at in (0..BLOCK).step_by(S::LANES) {
-            for (to, from) in work.information.iter_mut().zip(&self.block.information) {
+            for (to, from) in work.information.iter_mut().zip(self.block.information.iter()) {
                 *to = simd.load(&from[at..]) * scale;
             }
             for (to, from) in work.covariance.iter_mut().zip(&self.form.constant) {

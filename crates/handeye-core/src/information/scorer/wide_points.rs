@@ -2,7 +2,7 @@
 
 use super::block::{BLOCK, Block};
 use super::forms::packed;
-use super::target::Target;
+use super::target::{Patch, Target};
 use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
 use crate::lanes::{Bent, Window, bend, load};
 use crate::simd::{Kernel, Simd, Vector};
@@ -50,15 +50,15 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool> Kernel
         // Column by column, so that one load serves two products.
         let mut rows = [[zero; TOGETHER]; COLUMNS];
         for at in (0..BLOCK).step_by(S::LANES) {
-            for sum in &mut self.block.information {
+            for sum in self.block.information.iter_mut() {
                 zero.store(&mut sum[at..]);
             }
             let pose = load(simd, &self.block.pose, at);
             let mut seen = zero;
             let mut filled = 0;
-            for line in &self.target.lines {
-                for along in &line.x {
-                    let point = [*along, line.y, line.z];
+            for (y, z, along) in self.target.patches.iter().flat_map(Patch::lines) {
+                for x in along {
+                    let point = [x, y, z];
                     seen = seen + self.look::<S>(simd, &pose, point, &mut rows, filled);
                     filled += 2;
                     if filled == TOGETHER {
