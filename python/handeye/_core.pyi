@@ -9,7 +9,7 @@ A wrong shape, a parameter out of its range or a transform that is not rigid rai
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from numpy import bool_, float32, float64, int64, uint8
+from numpy import bool_, float64, int64, uint8
 from numpy.typing import ArrayLike, NDArray
 
 # Rigid transforms
