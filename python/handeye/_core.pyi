@@ -9,7 +9,7 @@ A wrong shape, a parameter out of its range or a transform that is not rigid rai
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from numpy import bool_, float32, float64, uint8
+from numpy import bool_, float64, int64, uint8
 from numpy.typing import ArrayLike, NDArray
 
 # Rigid transforms
@@ -89,23 +89,22 @@ def planar_pose(
 # Measuring in pictures
 
 def fit_corners(
-    image: NDArray[float32],
+    image: NDArray[uint8],
     places: ArrayLike,
     directions: ArrayLike,
     curvatures: ArrayLike,
     radii: ArrayLike,
     bands: ArrayLike,
     is_crossing: bool,
-    smoothing_px: float,
-    passes: int,
+    settle: bool,
 ) -> NDArray[float64]:
     """Corners (N, 2) fitted to grey values; NaN where there is none near the guess.
 
-    `image` (H, W) is contiguous and was smoothed by a Gaussian of `smoothing_px`. `places` (N, 2) are
-    guesses, `directions` (N, 2, 2) those of the two edges, `curvatures` (N, 2) theirs in 1 / px towards the
-    normals (-sin, cos); `radii` (N,) are free of other edges and `bands` (N,) the distances from the edges,
-    in pixels, beyond which there is something else. At a crossing diagonal parts are equal and the light may
-    change; else the four parts may be of any grey. After each of several passes the window is laid anew.
+    `image` (H, W) is contiguous. `places` (N, 2) are guesses, `directions` (N, 2, 2) those of the two edges,
+    `curvatures` (N, 2) theirs in 1 / px towards the normals (-sin, cos); `radii` (N,) are free of other edges
+    and `bands` (N,) the distances from the edges, in pixels, beyond which there is something else. At a
+    crossing diagonal parts are equal and the light may change; else the four parts may be of any grey. With
+    `settle` a window in which the corner was not in the middle is laid anew around it.
     """
 
 def area_centroids(
@@ -169,7 +168,7 @@ class Problem:
         points: ArrayLike,
         radii: ArrayLike,
         pixels: ArrayLike,
-        offsets: list[int],
+        offsets: Sequence[int] | NDArray[int64],
         motions: ArrayLike,
         *,
         covariances: ArrayLike | None = None,
@@ -209,6 +208,9 @@ class Solution:
     def kinematic(self) -> list[float]: ...
     @property
     def information(self) -> NDArray[float64]: ...
+    @property
+    def covariance(self) -> NDArray[float64]:
+        """Inverse of the information; raises DegenerateError if that is singular."""
     @property
     def prior_information(self) -> NDArray[float64]: ...
     @property

@@ -10,6 +10,7 @@ use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
 type Block = [f64; MAX_LANES];
 
 /// `U' D^-1 U` of a positive definite matrix, `D` the diagonal of the upper triangular `U`.
+#[derive(Clone, Debug)]
 pub(crate) struct Factor {
     size: usize,
     /// Blocks of a row.

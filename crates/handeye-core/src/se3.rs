@@ -177,7 +177,11 @@ impl Se3 {
     pub fn exp(xi: &Vector6<f64>) -> Self {
         let rho = xi.fixed_rows::<3>(0).into_owned();
         let phi = xi.fixed_rows::<3>(3).into_owned();
-        Self::new(so3_exp(&phi), so3_left_jacobian(&phi) * rho)
+        let (a, b, c) = sinc_terms(phi.norm());
+        let k = hat(&phi);
+        let k2 = k * k;
+        let jacobian = Matrix3::identity() + k * b + k2 * c;
+        Self::new(Matrix3::identity() + k * a + k2 * b, jacobian * rho)
     }
 
     /// Twist `[rho; phi]` with `exp(log(T)) = T`; the rotation angle lies in `[0, pi]`.

@@ -7,14 +7,53 @@ use std::borrow::Cow;
 
 use handeye_core::se3::Se3;
 use nalgebra::{Matrix4, SMatrix, SVector};
-use numpy::ndarray::{ArrayD, IxDyn};
-use numpy::{AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyUntypedArrayMethods};
+use numpy::ndarray::{ArrayD, ArrayViewD, IxDyn};
+use numpy::{
+    AllowTypeChange, IntoPyArray, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods,
+    PyUntypedArrayMethods, ToPyArray,
+};
 use pyo3::prelude::*;
 
 use crate::errors::{invalid, to_python};
 
 /// Anything that `numpy.asarray(..., float64)` accepts.
-pub type Array<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
+pub struct Array<'py>(Bound<'py, PyArrayDyn<f64>>);
+
+impl<'py> FromPyObject<'_, 'py> for Array<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(array) = object.cast::<PyArrayDyn<f64>>() {
+            return Ok(Self(array.to_owned()));
+        }
+        let converted: PyArrayLikeDyn<'py, f64, AllowTypeChange> = object.extract()?;
+        Ok(Self(converted.as_any().cast::<PyArrayDyn<f64>>()?.clone()))
+    }
+}
+
+impl Array<'_> {
+    /// Sizes of its dimensions.
+    pub fn shape(&self) -> &[usize] {
+        self.0.shape()
+    }
+}
+
+/// Anything that is a sequence of whole numbers, none negative.
+pub struct Indices(pub Vec<usize>);
+
+impl<'py> FromPyObject<'_, 'py> for Indices {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(array) = object.cast::<PyArray1<i64>>()
+            && let Ok(values) = array.to_vec()
+            && let Ok(indices) = values.into_iter().map(usize::try_from).collect()
+        {
+            return Ok(Self(indices));
+        }
+        object.extract().map(Self)
+    }
+}
 
 /// Checks a shape against a pattern; `None` stands for any size.
 fn check_shape(py: Python<'_>, name: &str, array: &Array<'_>, pattern: &[Option<usize>]) -> PyResult<()> {
@@ -65,10 +104,15 @@ pub fn rows<'a, const D: usize>(
 
 /// Entries in row-major order, in place where they lie that way.
 pub fn in_place<'a>(array: &'a Array<'_>) -> Cow<'a, [f64]> {
-    // A slice is given of column-major arrays too.
-    match array.as_slice() {
-        Ok(entries) if array.is_c_contiguous() => Cow::Borrowed(entries),
-        _ => Cow::Owned(array.as_array().iter().copied().collect()),
+    // SAFETY: the reference keeps the array alive, and nothing in this module writes to an array that came in. That
+    // nothing in Python does so meanwhile is what numpy relies on too; the crate's register of borrows would not see
+    // it, and asking it takes longer than reading a short array.
+    unsafe {
+        match array.0.as_slice() {
+            // A slice is given of column-major arrays too.
+            Ok(entries) if array.0.is_c_contiguous() => Cow::Borrowed(entries),
+            _ => Cow::Owned(array.0.as_array().iter().copied().collect()),
+        }
     }
 }
 
@@ -130,11 +174,24 @@ fn rigid(py: Python<'_>, name: impl Fn() -> String, m: &[f64]) -> PyResult<Se3> 
     })
 }
 
+/// Entries that are sooner copied than handed over.
+const FEW: usize = 512;
+
 /// An array of the given shape from its entries in row-major order.
 pub fn array<'py>(py: Python<'py>, shape: &[usize], entries: Vec<f64>) -> Bound<'py, PyArrayDyn<f64>> {
+    if entries.len() <= FEW {
+        return slice_out(py, shape, &entries);
+    }
     ArrayD::from_shape_vec(IxDyn(shape), entries)
         .expect("as many entries as the shape says, by construction")
         .into_pyarray(py)
+}
+
+/// As [`array`], copied.
+fn slice_out<'py>(py: Python<'py>, shape: &[usize], entries: &[f64]) -> Bound<'py, PyArrayDyn<f64>> {
+    ArrayViewD::from_shape(IxDyn(shape), entries)
+        .expect("as many entries as the shape says, by construction")
+        .to_pyarray(py)
 }
 
 /// An `(N, D)` array.
@@ -150,7 +207,7 @@ pub fn matrix_out<'py, const R: usize, const C: usize>(
     py: Python<'py>,
     m: &SMatrix<f64, R, C>,
 ) -> Bound<'py, PyArrayDyn<f64>> {
-    array(py, &[R, C], m.transpose().iter().copied().collect())
+    slice_out(py, &[R, C], m.transpose().as_slice())
 }
 
 /// An `(N, R, C)` array.
@@ -185,7 +242,7 @@ pub fn scalars_out(py: Python<'_>, values: Vec<f64>) -> Bound<'_, PyArrayDyn<f64
 
 /// An `(R, C)` array of a matrix of any size.
 pub fn dynamic_out<'py>(py: Python<'py>, m: &nalgebra::DMatrix<f64>) -> Bound<'py, PyArrayDyn<f64>> {
-    array(py, &[m.nrows(), m.ncols()], m.transpose().as_slice().to_vec())
+    slice_out(py, &[m.nrows(), m.ncols()], m.transpose().as_slice())
 }
 
 /// An `(N, R, C)` array of matrices of one size.

@@ -1,7 +1,7 @@
 //! Serial arms, batched.
 
 use handeye_core::kinematics::{Chain as CoreChain, Frame, InverseOptions, Joint, JointKind};
-use numpy::{PyArrayDyn, PyUntypedArrayMethods};
+use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::convert::{self, Array};
@@ -28,11 +28,7 @@ impl Chain {
                 &format!("joints must have shape (N, {}), found {shape:?}", self.inner.len()),
             ));
         }
-        let values = match joints.as_array().as_slice() {
-            Some(values) => values.to_vec(),
-            None => joints.as_array().iter().copied().collect(),
-        };
-        Ok((shape[0], values))
+        Ok((shape[0], convert::in_place(joints).into_owned()))
     }
 }
 

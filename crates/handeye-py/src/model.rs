@@ -4,7 +4,6 @@ use handeye_core::least_squares::{
     ChainPrior, KinematicParameters, Model as CoreModel, PixelParameters, RobotNoise, Side,
 };
 use nalgebra::{DMatrix, SVector};
-use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
 use crate::convert::{self, Array};

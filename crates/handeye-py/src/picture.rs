@@ -2,7 +2,7 @@
 
 use handeye_core::error::Error;
 use handeye_core::picture::Picture;
-use handeye_core::picture::corner::{CornerGuess, CornerKind, fit_corner};
+use handeye_core::picture::corner::{CornerFitter, CornerGuess, CornerKind};
 use handeye_core::picture::spot::{Spot, area_centroid};
 use numpy::{PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -24,7 +24,7 @@ fn same_length(py: Python<'_>, lengths: &[usize]) -> PyResult<()> {
     Err(to_python(py, Error::invalid(format!("arguments of different lengths: {lengths:?}"))))
 }
 
-fn picture<'a, T: numpy::Element + Copy + Into<f64>>(
+fn picture<'a, T: numpy::Element + Copy + Into<f32>>(
     py: Python<'_>,
     image: &'a PyReadonlyArray2<'_, T>,
 ) -> PyResult<Picture<'a, T>> {
@@ -39,15 +39,14 @@ fn picture<'a, T: numpy::Element + Copy + Into<f64>>(
 #[expect(clippy::too_many_arguments, reason = "one array for each part of the guess")]
 fn fit_corners<'py>(
     py: Python<'py>,
-    image: PyReadonlyArray2<'py, f32>,
+    image: PyReadonlyArray2<'py, u8>,
     places: Array<'py>,
     directions: Array<'py>,
     curvatures: Array<'py>,
     radii: Array<'py>,
     bands: Array<'py>,
     is_crossing: bool,
-    smoothing_px: f64,
-    passes: usize,
+    settle: bool,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let places = convert::vectors::<2>(py, "places", &places)?;
     let directions = convert::matrices::<2, 2>(py, "directions", &directions)?;
@@ -66,11 +65,8 @@ fn fit_corners<'py>(
         band: bands[i],
     });
     let found = py.detach(|| {
-        guesses
-            .flat_map(|guess| {
-                fit_corner(&picture, &guess, kind, smoothing_px, passes).unwrap_or([f64::NAN; 2])
-            })
-            .collect()
+        let mut fitter = CornerFitter::new(picture, kind);
+        guesses.flat_map(|guess| fitter.fit(&guess, settle).unwrap_or([f64::NAN; 2])).collect()
     });
     Ok(convert::array(py, &[n, 2], found))
 }

@@ -2,7 +2,6 @@
 
 use handeye_core::planning::{Objective, certify as core_certify, select as core_select};
 use nalgebra::DMatrix;
-use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
 use crate::convert::{self, Array};

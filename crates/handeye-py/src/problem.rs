@@ -1,5 +1,6 @@
 //! Measurements and their solution, as Python values.
 
+use handeye_core::error::Error;
 use handeye_core::least_squares::{
     Loss, Method, Options, Problem as CoreProblem, Solution as CoreSolution, Start, solve, view_block,
 };
@@ -7,7 +8,7 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::camera::{camera, features};
-use crate::convert::{self, Array};
+use crate::convert::{self, Array, Indices};
 use crate::errors::{invalid, to_python};
 use crate::model::Model;
 
@@ -64,7 +65,7 @@ impl Problem {
         points: Array<'py>,
         radii: Array<'py>,
         pixels: Array<'py>,
-        offsets: Vec<usize>,
+        offsets: Indices,
         motions: Array<'py>,
         covariances: Option<Array<'py>>,
     ) -> PyResult<Self> {
@@ -74,7 +75,7 @@ impl Problem {
         let motions = convert::transforms(py, "motions", &motions)?;
         let covariances =
             covariances.map(|c| convert::matrices::<2, 2>(py, "covariances", &c)).transpose()?;
-        let inner = CoreProblem::new(camera, features, pixels, covariances.as_deref(), offsets, motions)
+        let inner = CoreProblem::new(camera, features, pixels, covariances.as_deref(), offsets.0, motions)
             .map_err(|e| to_python(py, e))?;
         Ok(Self { inner })
     }
@@ -186,6 +187,18 @@ impl Solution {
     #[getter]
     fn information<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f64>> {
         convert::dynamic_out(py, &self.inner.information)
+    }
+
+    /// Inverse of the information.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let covariance = self.inner.covariance().ok_or_else(|| {
+            to_python(
+                py,
+                Error::degenerate("the information is singular: the views do not determine the answer"),
+            )
+        })?;
+        Ok(convert::dynamic_out(py, &covariance))
     }
 
     /// The part of the information that came from priors.

@@ -8,7 +8,6 @@ fitting itself is done in `handeye._core`.
 
 from enum import Enum
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,20 +15,11 @@ from handeye import _core
 from handeye.detection.base import Image
 from handeye.types.arrays import FloatArray
 
-LARGEST_RADIUS_PX = 30.0
-# Cameras sharpen, and guess colours between the pixels that see them: where an edge runs along the rows of
-# pixels that shifts it, less so in a picture smoothed beforehand (standard deviation).
-SMOOTHING_PX = 1.0
 # Half the width of the strip along each edge that is looked at.
 BAND_PX = 4.0
 # Corners further than this from where others put them are not what they seem; where a board is near, so that
 # a pitch is many pixels, further than a share of it.
 ASTRAY_PX, ASTRAY_SHARE = 1.5, 0.06
-# A window is where it belongs if its corner is so near to its middle, per squared half width of the strips:
-# the wider they are, the less it matters.
-SETTLED = 0.008
-# Pixels around the corners that windows and smoothing may reach.
-_REACH_PX = round(LARGEST_RADIUS_PX) + 7
 
 
 class CornerKind(Enum):
@@ -78,32 +68,13 @@ def fit_corners(
         Whether windows in which the corner was not in the middle are laid anew around it, so that the guess
         matters little.
     """
-    finite = np.isfinite(corners).all(axis=1)
-    if not finite.any():
-        return np.full((len(corners), 2), np.nan)
-    size = np.array(image.shape[::-1])
-    low = np.clip(np.floor(corners[finite].min(axis=0)) - _REACH_PX, 0, size - 1).astype(int)
-    high = np.clip(np.ceil(corners[finite].max(axis=0)) + _REACH_PX + 1, low + 1, size).astype(int)
-    part = image[low[1] : high[1], low[0] : high[0]].astype(np.float32)
-    smooth = np.asarray(cv2.GaussianBlur(part, (0, 0), SMOOTHING_PX), dtype=np.float32)
-    bends = np.zeros((len(corners), 2)) if curvatures is None else curvatures
-    strips = np.full(len(corners), BAND_PX) if bands is None else bands
-
-    def fitted(guesses: FloatArray, which: NDArray[np.bool_]) -> FloatArray:
-        return _core.fit_corners(
-            smooth,
-            guesses[which],
-            directions[which],
-            bends[which],
-            radii[which],
-            strips[which],
-            kind is CornerKind.CROSSING,
-            SMOOTHING_PX,
-            1,
-        )
-
-    found = fitted(corners - low, np.ones(len(corners), dtype=np.bool_))
-    if settle:
-        again = np.linalg.norm(found + low - corners, axis=1) > SETTLED * strips * strips
-        found[again] = fitted(found, again)
-    return found + low
+    return _core.fit_corners(
+        image,
+        corners,
+        directions,
+        np.zeros((len(corners), 2)) if curvatures is None else curvatures,
+        radii,
+        np.full(len(corners), BAND_PX) if bands is None else bands,
+        kind is CornerKind.CROSSING,
+        settle,
+    )

@@ -15,7 +15,7 @@ from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid, Target
 
 SMALLEST_SIDE_PX = 24
 # To be raised with every change of what is detected, or where.
-VERSION = 3
+VERSION = 4
 
 _FINDERS: dict[type[Target], Callable[[Image, Any], Detection | NotFound]] = {
     Chessboard: chessboard.find,

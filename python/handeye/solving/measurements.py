@@ -170,6 +170,6 @@ class Measurements:
             if points
             else np.zeros(0),
             np.concatenate([view.pixels for view in self.views]) if points else np.zeros((0, 2)),
-            [int(offset) for offset in offsets],
+            offsets,
             self.motions,
         )

@@ -61,14 +61,13 @@ def paper_estimate(measurements: Measurements, previous: Estimate | None = None)
     noise = Noise(
         (sigma,) * len(measurements), how="one pixel noise for all views, robot and camera taken as exact"
     )
-    belief = _core.Belief(solution.information)
     return Estimate(
         mounting=measurements.mounting,
         target=measurements.target,
         X=X,
         Y=Y,
         camera=measurements.camera,
-        covariance=belief.covariance,
+        covariance=solution.covariance,
         hypotheses=(Hypothesis(1.0, RobotSide.NONE, 0.0, 0.0, solution.information),),
         noise=noise,
         model=ModelName.PAPER,

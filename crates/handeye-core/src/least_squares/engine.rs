@@ -36,17 +36,16 @@ pub(super) trait Engine {
     fn report(&mut self, initial_cost: f64, iterations: usize, ending: Ending) -> Solution;
 }
 
-/// Whether an information leaves a direction open.
-pub(super) fn is_degenerate(information: &DMatrix<f64>) -> bool {
-    smallest_pivot(information) < PIVOT_LIMIT
+/// The factorisation of the final information, and the ending: degenerate where a direction is left open.
+pub(super) fn judge(information: &DMatrix<f64>, ending: Ending) -> (Option<Factor>, Ending) {
+    let finite = information.as_slice().iter().fold(true, |fine, x| fine & x.is_finite());
+    let factor = if finite { Factor::new(information) } else { None };
+    let open = factor.as_ref().is_none_or(|factor| smallest_pivot(information, factor) < PIVOT_LIMIT);
+    (factor, if open { Ending::Degenerate } else { ending })
 }
 
-/// Smallest pivot of the factorisation of `h` as a share of its diagonal; zero if it does not exist.
-pub(super) fn smallest_pivot(h: &DMatrix<f64>) -> f64 {
-    if h.as_slice().iter().any(|x| !x.is_finite()) {
-        return 0.0;
-    }
-    let Some(factor) = Factor::new(h) else { return 0.0 };
+/// Smallest pivot of the factorisation of `h` as a share of its diagonal.
+pub(super) fn smallest_pivot(h: &DMatrix<f64>, factor: &Factor) -> f64 {
     let shares = factor.pivots().enumerate().map(|(i, pivot)| pivot / h[(i, i)]);
     shares.fold(f64::INFINITY, f64::min)
 }

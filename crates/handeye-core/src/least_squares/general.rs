@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SMatrix, Vector6};
 
 use super::accumulate::{ViewBlock, view_block};
-use super::engine::{Engine, Proposal, is_degenerate};
+use super::engine::{Engine, Proposal, judge};
 use super::loss::Loss;
 use super::marginal::{Eliminated, eliminate};
 use super::model::{Model, Side};
@@ -317,7 +317,7 @@ impl Parts<'_> {
         let n = self.model.parameter_count();
         let mut prior_information = DMatrix::zeros(n, n);
         self.add_priors(state, &mut prior_information, &mut DVector::zeros(n));
-        let degenerate = is_degenerate(&system.h);
+        let (factor, ending) = judge(&system.h, ending);
         let views = at
             .views
             .iter()
@@ -345,11 +345,12 @@ impl Parts<'_> {
             board_scale: state.board_scale,
             kinematic: state.kinematic.clone(),
             information: system.h,
+            factor,
             prior_information,
             cost: at.cost,
             initial_cost,
             iterations,
-            ending: if degenerate { Ending::Degenerate } else { ending },
+            ending,
             views,
             correction_log_determinant: system.log_determinant,
         }

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::camera::Camera;
+use crate::positive::Factor;
 use crate::se3::Se3;
 
 /// Why the iteration stopped.
@@ -73,6 +74,8 @@ pub struct Solution {
     pub kinematic: DVector<f64>,
     /// Information of the global parameters, pose corrections marginalised, priors included.
     pub information: DMatrix<f64>,
+    /// Factorisation of `information` where it is positive definite.
+    pub(super) factor: Option<Factor>,
     /// The part of `information` that came from priors.
     pub prior_information: DMatrix<f64>,
     /// Minus twice the log posterior up to constants: whitened residuals, corrections and priors.
@@ -87,4 +90,12 @@ pub struct Solution {
     pub views: Vec<ViewReport>,
     /// Sum over views of `ln |I + L' M L|`: the determinant that marginal likelihood needs.
     pub correction_log_determinant: f64,
+}
+
+impl Solution {
+    /// Covariance of the global parameters, the inverse of their information; `None` where that is singular.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let inverse = self.factor.as_ref()?.inverse();
+        inverse.as_slice().iter().all(|x| x.is_finite()).then_some(inverse)
+    }
 }

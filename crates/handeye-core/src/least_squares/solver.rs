@@ -8,7 +8,7 @@ use super::loss::Loss;
 use super::model::Model;
 use super::problem::{MIN_VIEWS, Problem};
 use super::report::{Ending, Solution};
-use super::side_by_side::{Measurements, SideBySide, fits};
+use super::side_by_side::{Desk, Measurements, SideBySide, fits};
 use crate::error::Error;
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
@@ -106,9 +106,9 @@ pub fn solve(
         packed.as_ref()
     };
     if let Some(measurements) = measurements {
-        let unit = VectorUnit::widest();
-        let mut engine =
-            SideBySide::new(problem, model, options, views, measurements, start, unit).map_err(hidden)?;
+        let mut desk = Desk::new(VectorUnit::widest());
+        let mut engine = SideBySide::new(problem, model, options, views, measurements, start, &mut desk)
+            .map_err(hidden)?;
         return Ok(iterate(&mut engine, options, samples));
     }
     let mut engine = General::new(problem, model, options.loss, views, start).map_err(hidden)?;

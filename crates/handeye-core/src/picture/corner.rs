@@ -5,8 +5,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::corner_equations::{Equations, FIRST, LOG_BLUR, MEAN, N, PRODUCT, SECOND, Samples, Sum, X, Y};
-use super::{Picture, nearest};
+use super::Picture;
+use super::corner_equations::{Equations, FIRST, Greys, LOG_BLUR, MEAN, N, PRODUCT, SECOND, Sum, X, Y};
+use super::corner_window::{SMOOTHING_PX, Window};
 use crate::simd::{VectorUnit, dispatch};
 
 /// Radii of windows in pixels; what is asked for is clamped to them.
@@ -21,6 +22,9 @@ const BLUR_RANGE_PX: [f64; 2] = [0.25, 4.0];
 const LEAST_CONTRAST: f64 = 4.0;
 /// Least share of the window that lies inside the picture.
 const LEAST_INSIDE: f64 = 0.75;
+/// A window is where it belongs if its corner is so near to its middle, per squared half width of the strips: the
+/// wider they are, the less it matters.
+const SETTLED: f64 = 0.008;
 
 type Parameters = SVector<f64, N>;
 
@@ -48,184 +52,165 @@ pub struct CornerGuess {
     pub band: f64,
 }
 
-struct Window {
-    samples: Samples,
-    share_inside: f64,
+impl CornerGuess {
+    fn is_usable(&self) -> bool {
+        let numbers = [self.place, self.directions[0], self.directions[1], self.curvatures];
+        numbers.iter().flatten().chain([&self.radius, &self.band]).all(|x| x.is_finite()) && self.radius > 0.0
+    }
 }
 
-impl Window {
-    /// Takes the pixels near the edges; those further away tell nothing about the corner.
-    fn around<T: Copy + Into<f64>>(
-        picture: &Picture<'_, T>,
-        guess: &CornerGuess,
-        origin: [i64; 2],
-        radius: f64,
-    ) -> Self {
-        let [column, row] = origin;
-        let (dx, dy) = (guess.place[0] - column as f64, guess.place[1] - row as f64);
-        let band = guess.band.min(BAND_PX);
-        #[expect(clippy::cast_possible_truncation, reason = "a radius is in its range")]
-        let reach = radius.ceil() as i64 + 1;
-        let (mut samples, mut inside, mut whole) = (Samples::default(), 0.0, 0.0);
-        for v in -reach..=reach {
-            for u in -reach..=reach {
-                let (x, y) = (u as f64 - dx, v as f64 - dy);
-                let from_edge = guess
-                    .directions
-                    .iter()
-                    .map(|d| (d[0] * y - d[1] * x).abs())
-                    .fold(f64::INFINITY, f64::min);
-                let strip = (band - from_edge + 0.5).clamp(0.0, 1.0);
-                if strip == 0.0 {
-                    continue;
-                }
-                // A soft rim, so that no pixel leaps in or out as the corner moves.
-                let weight = strip * (radius - (x * x + y * y).sqrt() + 0.5).clamp(0.0, 1.0);
-                if weight > 0.0 {
-                    whole += weight;
-                    if let Some(grey) = picture.at(column + u, row + v) {
-                        inside += weight;
-                        samples.push([u as f64, v as f64], grey, weight);
-                    }
-                }
+/// Fits corners in a picture, one after the other.
+pub struct CornerFitter<'a, T> {
+    picture: Picture<'a, T>,
+    kind: CornerKind,
+    unit: VectorUnit,
+    window: Window,
+}
+
+impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
+    /// A fitter for corners of one kind.
+    pub fn new(picture: Picture<'a, T>, kind: CornerKind) -> Self {
+        Self { picture, kind, unit: VectorUnit::widest(), window: Window::default() }
+    }
+
+    /// Fits a corner; `None` where there is none, or where it is not near the guess.
+    ///
+    /// With `settle` a window in which the corner was not in the middle is laid anew around it, so that the guess
+    /// matters little.
+    pub fn fit(&mut self, guess: &CornerGuess, settle: bool) -> Option<[f64; 2]> {
+        if !guess.is_usable() {
+            return None;
+        }
+        let radius = guess.radius.clamp(RADIUS_RANGE_PX[0], RADIUS_RANGE_PX[1]);
+        let guess = CornerGuess { radius, band: guess.band.min(BAND_PX), ..*guess };
+        let fit = self.fitted(&guess, None)?;
+        let place = [fit[X], fit[Y]];
+        let away = (place[0] - guess.place[0]).hypot(place[1] - guess.place[1]);
+        if !settle || away <= SETTLED * guess.band * guess.band {
+            return Some(place);
+        }
+        let fit = self.fitted(&CornerGuess { place, ..guess }, Some(fit))?;
+        Some([fit[X], fit[Y]])
+    }
+
+    /// Fits in the window around a guess, from there or from what was found before; places are of the picture.
+    fn fitted(&mut self, guess: &CornerGuess, before: Option<Parameters>) -> Option<Parameters> {
+        let share_inside = self.window.lay(self.unit, &self.picture, guess);
+        if share_inside < LEAST_INSIDE {
+            return None;
+        }
+        let origin = self.window.origin.map(|x| x as f64);
+        let mut start = before.unwrap_or_else(|| {
+            let mut start = Parameters::zeros();
+            for (i, d) in [FIRST, SECOND].into_iter().zip(guess.directions) {
+                start[i] = d[1].atan2(d[0]);
+            }
+            start[LOG_BLUR] = SMOOTHING_PX.ln();
+            start
+        });
+        start[X] = guess.place[0] - origin[0];
+        start[Y] = guess.place[1] - origin[1];
+        if before.is_none() {
+            self.solve_greys(&mut start)?;
+        }
+        let mut fit = self.minimised(start, guess.curvatures)?;
+        let moved = (fit[X] - start[X]).hypot(fit[Y] - start[Y]);
+        let good = moved <= (0.25 * guess.radius).max(1.5)
+            && fit[PRODUCT].abs() * 2.0 >= LEAST_CONTRAST
+            && fit[LOG_BLUR] < BLUR_RANGE_PX[1].ln() - 1e-6;
+        fit[X] += origin[0];
+        fit[Y] += origin[1];
+        good.then_some(fit)
+    }
+
+    /// Solves for the greys, which enter linearly, once for the first guess of the rest.
+    fn solve_greys(&self, p: &mut Parameters) -> Option<()> {
+        let (samples, p_now) = (&self.window.samples, p.as_slice().try_into().unwrap_or([0.0; N]));
+        let (normal, right) = match self.kind {
+            CornerKind::Crossing => dispatch(self.unit, Greys::<true> { samples, p: p_now }),
+            CornerKind::Quadrants => dispatch(self.unit, Greys::<false> { samples, p: p_now }),
+        };
+        let ridge = SMatrix::<f64, 4, 4>::from_diagonal(&normal.diagonal().map(|d| 1e-6 * d + 1e-9));
+        p.fixed_rows_mut::<4>(MEAN).copy_from(&(normal + ridge).cholesky()?.solve(&right));
+        Some(())
+    }
+
+    /// Levenberg-Marquardt.
+    fn minimised(&self, mut p: Parameters, bends: [f64; 2]) -> Option<Parameters> {
+        let mut current = self.equations(&p, bends);
+        let mut damping = 1e-3;
+        for _ in 0..MAX_ITERATIONS {
+            let ridge =
+                SMatrix::<f64, N, N>::from_diagonal(&current.normal.diagonal().map(|d| damping * d + 1e-9));
+            let mut step = (current.normal + ridge).cholesky()?.solve(&current.right);
+            step[X] = step[X].clamp(-1.0, 1.0);
+            step[Y] = step[Y].clamp(-1.0, 1.0);
+            step[LOG_BLUR] = step[LOG_BLUR].clamp(-0.5, 0.5);
+            let mut trial = p + step;
+            trial[LOG_BLUR] = trial[LOG_BLUR].clamp(BLUR_RANGE_PX[0].ln(), BLUR_RANGE_PX[1].ln());
+            if step[X].abs().max(step[Y].abs()) < STEP_TOLERANCE_PX {
+                // So short a step needs no proof.
+                p = trial;
+                break;
+            }
+            let tried = self.equations(&trial, bends);
+            if tried.cost <= current.cost {
+                (p, current) = (trial, tried);
+                damping /= 10.0;
+            } else {
+                damping *= 10.0;
             }
         }
-        samples.pad();
-        Self { samples, share_inside: inside / whole.max(1e-9) }
+        p.iter().all(|x| x.is_finite()).then_some(p)
     }
-}
 
-/// Fits a corner; `None` where there is none, or where it is not near the guess.
-///
-/// `smoothing` is the standard deviation in pixels by which the picture was smoothed. After the first of several
-/// `passes` the window is laid anew where the corner was found, so that the guess does not matter.
-pub fn fit_corner<T: Copy + Into<f64>>(
-    picture: &Picture<'_, T>,
-    guess: &CornerGuess,
-    kind: CornerKind,
-    smoothing: f64,
-    passes: usize,
-) -> Option<[f64; 2]> {
-    let fitted = (0..passes).try_fold(*guess, |guess, _| fitted(picture, &guess, kind, smoothing))?;
-    Some(fitted.place)
-}
-
-fn fitted<T: Copy + Into<f64>>(
-    picture: &Picture<'_, T>,
-    guess: &CornerGuess,
-    kind: CornerKind,
-    smoothing: f64,
-) -> Option<CornerGuess> {
-    let numbers = [guess.place, guess.directions[0], guess.directions[1], guess.curvatures];
-    if !numbers.iter().flatten().chain([&guess.radius, &guess.band]).all(|x| x.is_finite())
-        || guess.radius <= 0.0
-    {
-        return None;
-    }
-    let radius = guess.radius.clamp(RADIUS_RANGE_PX[0], RADIUS_RANGE_PX[1]);
-    let origin = nearest(guess.place);
-    let window = Window::around(picture, guess, origin, radius);
-    if window.share_inside < LEAST_INSIDE {
-        return None;
-    }
-    let mut start = Parameters::zeros();
-    start[X] = guess.place[0] - origin[0] as f64;
-    start[Y] = guess.place[1] - origin[1] as f64;
-    for (i, d) in [FIRST, SECOND].into_iter().zip(guess.directions) {
-        start[i] = d[1].atan2(d[0]);
-    }
-    start[LOG_BLUR] = smoothing.clamp(BLUR_RANGE_PX[0], BLUR_RANGE_PX[1]).ln();
-    let fit = minimised(&window, with_greys(start, &window, guess, kind)?, guess, kind)?;
-    let moved = (fit[X] - start[X]).hypot(fit[Y] - start[Y]);
-    let good = moved <= (0.25 * radius).max(1.5)
-        && fit[PRODUCT].abs() * 2.0 >= LEAST_CONTRAST
-        && fit[LOG_BLUR] < BLUR_RANGE_PX[1].ln() - 1e-6;
-    good.then(|| CornerGuess {
-        place: [origin[0] as f64 + fit[X], origin[1] as f64 + fit[Y]],
-        directions: [FIRST, SECOND].map(|i| [fit[i].cos(), fit[i].sin()]),
-        ..*guess
-    })
-}
-
-/// Solves for the greys, which enter linearly, once for the first guess of the rest.
-fn with_greys(
-    mut p: Parameters,
-    window: &Window,
-    guess: &CornerGuess,
-    kind: CornerKind,
-) -> Option<Parameters> {
-    let equations = equations(&p, window, guess, kind);
-    let normal: SMatrix<f64, 4, 4> = equations.normal.fixed_view::<4, 4>(MEAN, MEAN).into_owned();
-    let ridge = SMatrix::<f64, 4, 4>::from_diagonal(&normal.diagonal().map(|d| 1e-6 * d + 1e-9));
-    let right: SVector<f64, 4> = equations.right.fixed_rows::<4>(MEAN).into_owned();
-    let greys = (normal + ridge).cholesky()?.solve(&right);
-    p.fixed_rows_mut::<4>(MEAN).copy_from(&greys);
-    Some(p)
-}
-
-/// Levenberg-Marquardt.
-fn minimised(
-    window: &Window,
-    mut p: Parameters,
-    guess: &CornerGuess,
-    kind: CornerKind,
-) -> Option<Parameters> {
-    let mut current = equations(&p, window, guess, kind);
-    let mut damping = 1e-3;
-    for _ in 0..MAX_ITERATIONS {
-        let ridge =
-            SMatrix::<f64, N, N>::from_diagonal(&current.normal.diagonal().map(|d| damping * d + 1e-9));
-        let mut step = (current.normal + ridge).cholesky()?.solve(&current.right);
-        step[X] = step[X].clamp(-1.0, 1.0);
-        step[Y] = step[Y].clamp(-1.0, 1.0);
-        step[LOG_BLUR] = step[LOG_BLUR].clamp(-0.5, 0.5);
-        let mut trial = p + step;
-        trial[LOG_BLUR] = trial[LOG_BLUR].clamp(BLUR_RANGE_PX[0].ln(), BLUR_RANGE_PX[1].ln());
-        let tried = equations(&trial, window, guess, kind);
-        if tried.cost <= current.cost {
-            (p, current) = (trial, tried);
-            damping /= 10.0;
-        } else {
-            damping *= 10.0;
+    fn equations(&self, p: &Parameters, bends: [f64; 2]) -> Equations {
+        let (samples, p) = (&self.window.samples, p.as_slice().try_into().unwrap_or([0.0; N]));
+        match self.kind {
+            CornerKind::Crossing => dispatch(self.unit, Sum::<true> { samples, p, bends }),
+            CornerKind::Quadrants => dispatch(self.unit, Sum::<false> { samples, p, bends }),
         }
-        if step[X].abs().max(step[Y].abs()) < STEP_TOLERANCE_PX {
-            break;
-        }
-    }
-    p.iter().all(|x| x.is_finite()).then_some(p)
-}
-
-fn equations(p: &Parameters, window: &Window, guess: &CornerGuess, kind: CornerKind) -> Equations {
-    let (p, bends) = (p.as_slice().try_into().unwrap_or([0.0; N]), guess.curvatures);
-    let unit = VectorUnit::widest();
-    match kind {
-        CornerKind::Crossing => dispatch(unit, Sum::<true> { samples: &window.samples, p, bends }),
-        CornerKind::Quadrants => dispatch(unit, Sum::<false> { samples: &window.samples, p, bends }),
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::single;
     use super::*;
 
     const SIDE: usize = 41;
 
-    /// Half the error function's way across an edge, by adding up.
+    /// The sides of a Gaussian cloud of spread one around a place at a distance from an edge, -1 to 1.
     fn side(distance: f64) -> f64 {
-        let n = 2000;
-        let step = distance / f64::from(n);
+        let n = 400;
+        let step = distance.clamp(-6.0, 6.0) / f64::from(n);
         let bell = |i: i32| (-0.5 * ((f64::from(i) + 0.5) * step).powi(2)).exp();
         (2.0 * std::f64::consts::FRAC_1_PI).sqrt() * step * (0..n).map(bell).sum::<f64>()
     }
 
+    /// Mean product of both sides, for distances from two edges and the cosine between them: slices along the first.
+    fn sides(a: f64, b: f64, cosine: f64) -> f64 {
+        let (n, step) = (96, 0.125);
+        let across = (1.0 - cosine * cosine).sqrt();
+        // The slice in which the first edge lies counts by its parts.
+        (0..n)
+            .map(|i| {
+                let u = (f64::from(i) + 0.5 - 0.5 * f64::from(n)) * step;
+                let weight = (-0.5 * u * u).exp() * step / (2.0 * std::f64::consts::PI).sqrt();
+                weight * ((a + u) / (0.5 * step)).clamp(-1.0, 1.0) * side((b + cosine * u) / across)
+            })
+            .sum()
+    }
+
     /// A corner at a place: dark and light as `greys` says, by the sides of two edges; straight and blurred.
-    fn drawn(place: [f64; 2], angles: [f64; 2], blur: f64, greys: [f64; 4]) -> Vec<f64> {
+    fn drawn(place: [f64; 2], angles: [f64; 2], blur: f64, greys: [f64; 4]) -> Vec<f32> {
         let turns = angles.map(f64::sin_cos);
         (0..SIDE * SIDE)
             .map(|i| {
                 let (x, y) = ((i % SIDE) as f64 - place[0], (i / SIDE) as f64 - place[1]);
-                let [a, b] = turns.map(|(sine, cosine)| side((cosine * y - sine * x) / blur));
-                greys[0] + greys[1] * a + greys[2] * b + greys[3] * a * b
+                let [a, b] = turns.map(|(sine, cosine)| (cosine * y - sine * x) / blur);
+                let both = sides(a, b, (angles[0] - angles[1]).cos());
+                single(greys[0] + greys[1] * side(a) + greys[2] * side(b) + greys[3] * both)
             })
             .collect()
     }
@@ -246,7 +231,7 @@ mod tests {
                 let grey = drawn(place, angles, 1.1, greys);
                 let picture = Picture::new(&grey, SIDE, SIDE).unwrap();
                 let start = guess([place[0] + 0.7, place[1] - 0.5], [angles[0] + 0.05, angles[1] - 0.04]);
-                let found = fit_corner(&picture, &start, kind, 1.0, 2).unwrap();
+                let found = CornerFitter::new(picture, kind).fit(&start, true).unwrap();
                 let error = (found[0] - place[0]).hypot(found[1] - place[1]);
                 assert!(error < 1e-3, "{kind:?} {place:?}: {error}");
             }
@@ -255,16 +240,17 @@ mod tests {
 
     #[test]
     fn no_corner_is_none() {
-        let flat = vec![90.0; SIDE * SIDE];
+        let flat = vec![90_u8; SIDE * SIDE];
         let picture = Picture::new(&flat, SIDE, SIDE).unwrap();
         for kind in [CornerKind::Crossing, CornerKind::Quadrants] {
-            assert!(fit_corner(&picture, &guess([20.0, 20.0], [0.0, 1.5]), kind, 1.0, 1).is_none());
+            assert!(CornerFitter::new(picture, kind).fit(&guess([20.0, 20.0], [0.0, 1.5]), false).is_none());
         }
         let grey = drawn([20.0, 20.0], [0.0, 1.5], 1.0, [120.0, 0.0, 0.0, 80.0]);
         let picture = Picture::new(&grey, SIDE, SIDE).unwrap();
         for place in [[20.0, 1.0], [-1e12, 5.0], [f64::NAN, 20.0], [26.0, 20.0]] {
             let start = guess(place, [0.0, 1.5]);
-            assert!(fit_corner(&picture, &start, CornerKind::Crossing, 1.0, 1).is_none(), "{place:?}");
+            let mut fitter = CornerFitter::new(picture, CornerKind::Crossing);
+            assert!(fitter.fit(&start, false).is_none(), "{place:?}");
         }
     }
 }

@@ -20,29 +20,40 @@ pub(super) const PRODUCT: usize = 8;
 
 /// Further from an edge than so many deviations of the blur there is only one side.
 const FAR: f64 = 6.0;
+/// Weight of what only fills the last vector, before it is weighed.
+const NOT_THERE: f64 = -1.0;
 
 /// Pixels of a window: places relative to the window's origin, grey values and weights.
 #[derive(Default)]
 pub(super) struct Samples {
-    x: Vec<f64>,
-    y: Vec<f64>,
-    grey: Vec<f64>,
-    weight: Vec<f64>,
+    pub x: Vec<f64>,
+    pub y: Vec<f64>,
+    pub grey: Vec<f64>,
+    pub weight: Vec<f64>,
 }
 
 impl Samples {
-    pub fn push(&mut self, [x, y]: [f64; 2], grey: f64, weight: f64) {
-        self.x.push(x);
-        self.y.push(y);
-        self.grey.push(grey);
-        self.weight.push(weight);
+    pub fn clear(&mut self) {
+        for values in [&mut self.x, &mut self.y, &mut self.grey, &mut self.weight] {
+            values.clear();
+        }
+    }
+
+    /// Adds neighbours of a row, the first of them at a place, weighed by their columns.
+    pub fn extend(&mut self, [column, row]: [i64; 2], greys: &[f32], weight: impl Fn(i64) -> f64) {
+        self.x.extend((column..).take(greys.len()).map(|u| u as f64));
+        self.weight.extend((column..).take(greys.len()).map(weight));
+        self.y.resize(self.x.len(), row as f64);
+        self.grey.extend(greys.iter().copied().map(f64::from));
     }
 
     /// Fills the last vector with pixels that do not count.
     pub fn pad(&mut self) {
-        while !self.x.len().is_multiple_of(MAX_LANES) {
-            self.push([0.0; 2], 0.0, 0.0);
+        let length = self.x.len().next_multiple_of(MAX_LANES);
+        for values in [&mut self.x, &mut self.y, &mut self.grey] {
+            values.resize(length, 0.0);
         }
+        self.weight.resize(length, NOT_THERE);
     }
 }
 
@@ -75,12 +86,18 @@ impl<const IS_CROSSING: bool> Kernel for Sum<'_, IS_CROSSING> {
     fn run<S: Simd>(self, simd: S) -> Equations {
         let p = self.p.map(|x| simd.splat(x));
         let inverse_blur = simd.splat((-self.p[LOG_BLUR]).exp());
-        let turn = |i: usize| {
+        let turns = [FIRST, SECOND].map(|i| {
             let (sine, cosine) = self.p[i].sin_cos();
             [simd.splat(sine), simd.splat(cosine)]
-        };
-        let turns = [turn(FIRST), turn(SECOND)];
+        });
         let half_bends = self.bends.map(|bend| simd.splat(0.5 * bend));
+        // Where edges are not square to each other, the blur across one goes along with that across the other: the
+        // share of both sides is not the product of theirs. Mehler's series, two terms.
+        let (sine, correlation) = (self.p[FIRST] - self.p[SECOND]).sin_cos();
+        let blur_squared = (2.0 * self.p[LOG_BLUR]).exp();
+        let together = [correlation * blur_squared, 0.5 * correlation * correlation].map(|x| simd.splat(x));
+        let turning = [sine * blur_squared, sine * correlation].map(|x| simd.splat(x) * p[PRODUCT]);
+        let per_blur_squared = simd.splat(-1.0 / blur_squared);
         let zero = simd.splat(0.0);
         let mut upper = [[zero; N]; N];
         let mut right = [zero; N];
@@ -91,10 +108,18 @@ impl<const IS_CROSSING: bool> Kernel for Sum<'_, IS_CROSSING> {
             let weight = simd.load(&self.samples.weight[at..]);
             let first = edge(simd, x, y, turns[0], inverse_blur, half_bends[0]);
             let second = edge(simd, x, y, turns[1], inverse_blur, half_bends[1]);
-            let both = first.side * second.side;
+            let slopes = first.slope * second.slope;
+            let distances = first.distance * second.distance;
+            let series = together[1].mul_add(distances, together[0]);
+            let both = slopes.mul_add(series, first.side * second.side);
+            let turned = slopes * turning[1].mul_add(distances, turning[0]);
             let (basis, drift) =
                 if IS_CROSSING { ([x, y], [p[A], p[B]]) } else { ([first.side, second.side], [zero; 2]) };
-            let (mut by_first, mut by_second) = (p[PRODUCT] * second.side, p[PRODUCT] * first.side);
+            let falling = series * per_blur_squared;
+            let of_first = falling.mul_add(first.distance, together[1] * second.distance);
+            let of_second = falling.mul_add(second.distance, together[1] * first.distance);
+            let mut by_first = p[PRODUCT] * of_first.mul_add(second.slope, second.side);
+            let mut by_second = p[PRODUCT] * of_second.mul_add(first.slope, first.side);
             if !IS_CROSSING {
                 by_first = by_first + p[A];
                 by_second = by_second + p[B];
@@ -104,8 +129,8 @@ impl<const IS_CROSSING: bool> Kernel for Sum<'_, IS_CROSSING> {
             let jacobian = [
                 across_first.mul_add(turns[0][0], across_second * turns[1][0]) - drift[0],
                 -across_first.mul_add(turns[0][1], across_second * turns[1][1]) - drift[1],
-                -(across_first * first.along),
-                -(across_second * second.along),
+                -across_first.mul_add(first.along, turned),
+                across_second.neg_mul_add(second.along, turned),
                 -across_first.mul_add(first.distance, across_second * second.distance),
                 simd.splat(1.0),
                 basis[0],
@@ -132,6 +157,48 @@ impl<const IS_CROSSING: bool> Kernel for Sum<'_, IS_CROSSING> {
             }
         }
         Equations { normal, right: sums, cost: cost.sum() }
+    }
+}
+
+/// Adds up the equations of the greys alone, for the rest as given; edges are taken as straight.
+pub(super) struct Greys<'a, const IS_CROSSING: bool> {
+    pub samples: &'a Samples,
+    pub p: [f64; N],
+}
+
+impl<const IS_CROSSING: bool> Kernel for Greys<'_, IS_CROSSING> {
+    type Output = (SMatrix<f64, 4, 4>, SVector<f64, 4>);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let place = [simd.splat(self.p[X]), simd.splat(self.p[Y])];
+        let inverse_blur = simd.splat((-self.p[LOG_BLUR]).exp());
+        let turns = [FIRST, SECOND].map(|i| {
+            let (sine, cosine) = self.p[i].sin_cos();
+            [simd.splat(sine), simd.splat(cosine)]
+        });
+        let zero = simd.splat(0.0);
+        let mut upper = [[zero; 4]; 4];
+        let mut right = [zero; 4];
+        for at in (0..self.samples.x.len()).step_by(S::LANES) {
+            let x = simd.load(&self.samples.x[at..]) - place[0];
+            let y = simd.load(&self.samples.y[at..]) - place[1];
+            let grey = simd.load(&self.samples.grey[at..]);
+            let weight = simd.load(&self.samples.weight[at..]);
+            let first = edge(simd, x, y, turns[0], inverse_blur, zero).side;
+            let second = edge(simd, x, y, turns[1], inverse_blur, zero).side;
+            let [a, b] = if IS_CROSSING { [x, y] } else { [first, second] };
+            let basis = [simd.splat(1.0), a, b, first * second];
+            for i in 0..4 {
+                let weighted = weight * basis[i];
+                right[i] = weighted.mul_add(grey, right[i]);
+                for k in i..4 {
+                    upper[i][k] = weighted.mul_add(basis[k], upper[i][k]);
+                }
+            }
+        }
+        let normal = SMatrix::from_fn(|i, k| upper[i.min(k)][i.max(k)].sum());
+        (normal, SVector::from(right.map(Vector::sum)))
     }
 }
 
@@ -195,9 +262,13 @@ mod tests {
         let mut samples = Samples::default();
         for i in 0..169 {
             let place = [f64::from(i % 13) - 6.0, f64::from(i / 13) - 6.0];
-            samples.push(place, 100.0 + 50.0 * random.normal(), random.normal().abs());
+            samples.x.push(place[0]);
+            samples.y.push(place[1]);
+            samples.grey.push(100.0 + 50.0 * random.normal());
+            samples.weight.push(random.normal().abs());
         }
         samples.pad();
+        samples.weight[169..].fill(0.0);
         samples
     }
 

@@ -2,7 +2,9 @@
 
 pub mod corner;
 mod corner_equations;
+mod corner_window;
 pub mod spot;
+mod spot_sums;
 
 use crate::error::Error;
 
@@ -14,7 +16,7 @@ pub struct Picture<'a, T> {
     height: usize,
 }
 
-impl<'a, T: Copy + Into<f64>> Picture<'a, T> {
+impl<'a, T: Copy + Into<f32>> Picture<'a, T> {
     /// A picture of `height` rows of `width` values.
     ///
     /// # Errors
@@ -26,11 +28,33 @@ impl<'a, T: Copy + Into<f64>> Picture<'a, T> {
         Ok(Self { grey, width, height })
     }
 
-    /// The grey value of a pixel, `None` outside.
-    fn at(&self, column: i64, row: i64) -> Option<f64> {
-        let (column, row) = (usize::try_from(column).ok()?, usize::try_from(row).ok()?);
-        (column < self.width && row < self.height).then(|| self.grey[row * self.width + column].into())
+    /// The grey values of a row from one column to another, both included; none if the first is the larger.
+    ///
+    /// All of them must be inside.
+    fn part(&self, row: i64, from: i64, to: i64) -> &[T] {
+        if from > to { &[] } else { &self.row(index(row))[index(from)..=index(to)] }
     }
+
+    /// Width and height, to be compared with places that may be outside.
+    fn size(&self) -> [i64; 2] {
+        [self.width, self.height].map(|side| i64::try_from(side).unwrap_or(i64::MAX))
+    }
+
+    /// The grey values of a row, which must be inside.
+    fn row(&self, row: usize) -> &[T] {
+        &self.grey[row * self.width..][..self.width]
+    }
+}
+
+/// In single precision, which is enough for grey values.
+#[expect(clippy::cast_possible_truncation, reason = "meant")]
+fn single(value: f64) -> f32 {
+    value as f32
+}
+
+/// A place inside as an index.
+fn index(place: i64) -> usize {
+    usize::try_from(place).unwrap_or(0)
 }
 
 /// The pixel nearest to a place; places far outside any picture all come out as one that is outside.

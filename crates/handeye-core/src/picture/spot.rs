@@ -6,7 +6,9 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use super::spot_sums::{Bounds, Levels, Moments, Ring};
 use super::{Picture, nearest};
+use crate::simd::VectorUnit;
 
 /// Half the width of the band around the edge in which pixels are partly covered: the pixel itself, and blur.
 const BAND_PX: f64 = 2.5;
@@ -16,6 +18,10 @@ const PASSES: usize = 3;
 const LEAST_CONTRAST: f64 = 3.0;
 /// No spot is larger: half axes in pixels.
 const LARGEST_AXIS_PX: f64 = 5000.0;
+/// Least light at an edge, as a share of that at the centre.
+const LEAST_LIGHT: f64 = 0.1;
+/// Fewer pixels around a spot say nothing of the level there.
+const FEWEST_OUTSIDE: f64 = 8.0;
 
 /// Centre of a spot, and its shape `S`: `x' S^-1 x = 1` for `x` from the centre to the edge.
 #[derive(Clone, Copy, Debug)]
@@ -29,18 +35,17 @@ pub struct Spot {
 /// Centroid and shape of the spot near a first guess; `None` where the picture's edge cuts it, or without contrast.
 ///
 /// `gap` is the narrowest free distance in pixels from its edge to that of the next spot.
-pub fn area_centroid<T: Copy + Into<f64>>(picture: &Picture<'_, T>, guess: &Spot, gap: f64) -> Option<Spot> {
-    (0..PASSES).try_fold(*guess, |spot, _| measured(picture, &spot, gap))
+pub fn area_centroid<T: Copy + Into<f32>>(picture: &Picture<'_, T>, guess: &Spot, gap: f64) -> Option<Spot> {
+    let mut ring = Ring::default();
+    (0..PASSES).try_fold(*guess, |spot, _| measured(picture, &spot, gap, &mut ring))
 }
 
-/// A pixel near the spot: offset from its centre, distance outwards from its edge, grey value.
-struct Sample {
-    offset: Vector2<f64>,
-    distance: f64,
-    grey: f64,
-}
-
-fn measured<T: Copy + Into<f64>>(picture: &Picture<'_, T>, spot: &Spot, gap: f64) -> Option<Spot> {
+fn measured<T: Copy + Into<f32>>(
+    picture: &Picture<'_, T>,
+    spot: &Spot,
+    gap: f64,
+    ring: &mut Ring,
+) -> Option<Spot> {
     let axes = half_axes(&spot.shape)?;
     if !(spot.centre.iter().all(|x| x.is_finite()) && axes[1] < LARGEST_AXIS_PX) || gap.is_nan() {
         return None;
@@ -56,31 +61,27 @@ fn measured<T: Copy + Into<f64>>(picture: &Picture<'_, T>, spot: &Spot, gap: f64
             return None;
         }
     }
-    let samples = samples(picture, spot, &extent, axes[0], reach, band)?;
-    let is_inside = |s: &Sample| s.distance < -band.min(0.5 * axes[0]);
-    let is_outside = |s: &Sample| s.distance > band && s.distance <= reach;
-    let outside: Vec<&Sample> = samples.iter().filter(|s| is_outside(s)).collect();
-    let inside: Vec<&Sample> = samples.iter().filter(|s| is_inside(s)).collect();
-    if outside.len() < 8 || inside.is_empty() {
+    let bounds = Bounds { inverse: spot.shape.try_inverse()?, inner: band.min(0.5 * axes[0]), band, reach };
+    let deep = gathered(picture, spot, &bounds, axes[0], ring);
+    let unit = VectorUnit::widest();
+    let (outside, rim) = ring.sorted(unit, bounds);
+    let inside = deep + rim;
+    if outside.number < FEWEST_OUTSIDE || inside.number < 1.0 {
         return None;
     }
-    let light = Light::of(&outside, &inside)?;
-    let (mut area, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
-    for sample in &samples {
-        if sample.distance > band {
-            continue;
-        }
-        let covered = if sample.distance < -band { 1.0 } else { light.covered(sample)? };
-        area += covered;
-        first += covered * sample.offset;
-        second += covered * sample.offset * sample.offset.transpose();
+    let levels = levels(&outside, &inside)?;
+    let edge = ring.covered(unit, levels);
+    if edge.least_light <= LEAST_LIGHT {
+        return None;
     }
+    let area = deep.number + edge.area;
     if area <= 0.0 {
         return None;
     }
-    let shift = first / area;
+    let shift = (deep.first + edge.first) / area;
     // A pixel is a square, not a point: its own second moment is 1 / 12.
-    let moments = second / area - shift * shift.transpose() + Matrix2::identity() / 12.0;
+    let second = (deep.second + edge.second) / area;
+    let moments = second - shift * shift.transpose() + Matrix2::identity() / 12.0;
     if shift.norm() > axes[1] || moments.determinant() <= 0.0 {
         return None;
     }
@@ -94,90 +95,77 @@ fn half_axes(shape: &Matrix2<f64>) -> Option<[f64; 2]> {
     (mean - spread > 1e-9 && mean.is_finite()).then(|| [(mean - spread).sqrt(), (mean + spread).sqrt()])
 }
 
-fn samples<T: Copy + Into<f64>>(
+/// Puts the pixels near the edge into the ring, and adds up those that are surely further inside.
+fn gathered<T: Copy + Into<f32>>(
     picture: &Picture<'_, T>,
     spot: &Spot,
-    extent: &Vector2<f64>,
+    bounds: &Bounds,
     axis: f64,
-    reach: f64,
-    band: f64,
-) -> Option<Vec<Sample>> {
-    let grown = 1.0 + reach / axis;
-    // The distance from the edge is at least (1 - q) times the shorter half axis.
-    let deep = (1.0 - band / axis).max(0.0).powi(2);
-    let far = grown.powi(2) * 4.0;
-    let inverse = spot.shape.try_inverse()?;
-    let [column, row] = nearest([spot.centre[0], spot.centre[1]]);
-    #[expect(clippy::cast_possible_truncation, reason = "no spot is so large")]
-    let [across, down] = [extent[0], extent[1]].map(|e| (e * grown).ceil() as i64 + 1);
-    let mut samples = Vec::new();
-    for v in row - down..=row + down {
-        for u in column - across..=column + across {
-            let Some(grey) = picture.at(u, v) else { continue };
-            let offset = Vector2::new(u as f64, v as f64) - spot.centre;
-            // Signed distance from the edge, to first order: (q - 1) / |grad q| with q the elliptical radius.
-            let solved = inverse * offset;
-            let squared = offset.dot(&solved);
-            if squared > far {
-                continue;
-            }
-            let distance = if squared < deep {
-                f64::NEG_INFINITY
-            } else {
-                let q = squared.max(1e-12).sqrt();
-                (q - 1.0) * q / (solved[0] * solved[0] + solved[1] * solved[1]).sqrt().max(1e-12)
-            };
-            samples.push(Sample { offset, distance, grey });
+    ring: &mut Ring,
+) -> Moments {
+    // The distance from the edge is at least |1 - q| times the shorter half axis, q the elliptical radius.
+    let far = (1.0 + bounds.reach / axis).powi(2);
+    let near = (1.0 - bounds.band / axis).max(0.0).powi(2);
+    let (xx, xy, yy) = (bounds.inverse[(0, 0)], bounds.inverse[(0, 1)], bounds.inverse[(1, 1)]);
+    // Columns of the pixels of a row whose squared elliptical radius is below a limit.
+    let span = |y: f64, limit: f64| -> [i64; 2] {
+        let middle = -xy * y;
+        let root = (middle * middle - xx * (yy * y * y - limit)).sqrt();
+        if !root.is_finite() {
+            return [i64::MAX, i64::MIN];
         }
+        let ends = [(middle - root) / xx, (middle + root) / xx];
+        #[expect(clippy::cast_possible_truncation, reason = "no spot is so large")]
+        [(spot.centre[0] + ends[0]).ceil() as i64, (spot.centre[0] + ends[1]).floor() as i64]
+    };
+    let half_height = (far * spot.shape[(1, 1)]).sqrt();
+    let [_, first] = nearest([0.0, (spot.centre[1] - half_height).max(0.0)]);
+    let [_, last] = nearest([0.0, (spot.centre[1] + half_height).min(picture.height as f64 - 1.0)]);
+    let mut deep = Moments::default();
+    ring.clear();
+    for row in first..=last {
+        let y = row as f64 - spot.centre[1];
+        let [from, to] = span(y, far);
+        let (from, to) = (from.max(0), to.min(picture.size()[0] - 1));
+        let [inner_from, inner_to] = span(y, near);
+        if inner_from > inner_to {
+            ring.extend(picture.part(row, from, to), from as f64 - spot.centre[0], y);
+            continue;
+        }
+        ring.extend(picture.part(row, from, inner_from - 1), from as f64 - spot.centre[0], y);
+        deep.add_row(picture.part(row, inner_from, inner_to), inner_from as f64 - spot.centre[0], y);
+        ring.extend(picture.part(row, inner_to + 1, to), (inner_to + 1) as f64 - spot.centre[0], y);
     }
-    Some(samples)
+    ring.pad();
+    deep
 }
 
-/// What ink and paper look like: levels at the centre, and a slope of the light that both share.
-struct Light {
-    slope: Vector2<f64>,
-    bright: f64,
-    dim: f64,
-}
-
-impl Light {
-    fn of(outside: &[&Sample], inside: &[&Sample]) -> Option<Self> {
-        // Ink and paper get the same light, `level (1 + slope' x)`: one slope from both, by least squares.
-        let (mut information, mut right) = (Matrix2::identity() * 1e-9, Vector2::zeros());
-        for part in [outside, inside] {
-            let number = part.len() as f64;
-            let level = part.iter().map(|s| s.grey).sum::<f64>() / number;
-            let middle = part.iter().map(|s| s.offset).sum::<Vector2<f64>>() / number;
-            for sample in part {
-                let x = sample.offset - middle;
-                information += level * level * x * x.transpose();
-                right += level * x * sample.grey;
-            }
-        }
-        let slope = information.try_inverse()? * right;
-        let level = |part: &[&Sample]| {
-            part.iter().map(|s| s.grey / (1.0 + s.offset.dot(&slope))).sum::<f64>() / part.len() as f64
-        };
-        let (bright, dim) = (level(outside), level(inside));
-        ((bright - dim).abs() >= LEAST_CONTRAST).then_some(Self { slope, bright, dim })
+/// What ink and paper look like, from the moments of the pixels outside and inside.
+///
+/// Ink and paper get the same light, `level (1 + slope' x)`: one slope from both, by least squares.
+fn levels(outside: &Moments, inside: &Moments) -> Option<Levels> {
+    let (mut information, mut right) = (Matrix2::identity() * 1e-9, Vector2::zeros());
+    for part in [outside, inside] {
+        let level = part.grey / part.number;
+        let middle = part.first / part.number;
+        information += level * level * (part.second - part.first * middle.transpose());
+        right += level * (part.grey_first - part.grey * middle);
     }
-
-    /// The share of a pixel that the spot covers; `None` where the light would be none.
-    fn covered(&self, sample: &Sample) -> Option<f64> {
-        let light = 1.0 + sample.offset.dot(&self.slope);
-        (light > 0.1).then(|| (self.bright - sample.grey / light) / (self.bright - self.dim))
-    }
+    let slope = information.try_inverse()? * right;
+    let [bright, dim] = [outside, inside].map(|part| part.grey / (part.number + part.first.dot(&slope)));
+    ((bright - dim).abs() >= LEAST_CONTRAST).then_some(Levels { slope, bright, dim })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::single;
     use super::*;
 
     const SIDE: usize = 48;
     const PARTS: usize = 40;
 
     /// A dark ellipse with axes along the picture's; each pixel holds the mean over its square.
-    fn drawn(centre: [f64; 2], axes: [f64; 2], light: f64) -> Vec<f64> {
+    fn drawn(centre: [f64; 2], axes: [f64; 2], light: f64) -> Vec<f32> {
         let part = |i: usize| (i as f64 + 0.5) / PARTS as f64 - 0.5;
         (0..SIDE * SIDE)
             .map(|i| {
@@ -190,7 +178,7 @@ mod tests {
                     })
                     .count() as f64
                     / (PARTS * PARTS) as f64;
-                (200.0 - 160.0 * covered) * (1.0 + light * (column - 24.0))
+                single((200.0 - 160.0 * covered) * (1.0 + light * (column - 24.0)))
             })
             .collect()
     }

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from handeye import _core
-from handeye.types.arrays import FloatArray
+from handeye.types.arrays import FloatArray, IndexArray
 
 SIZE_PX = (1280, 1024)
 SIGMA_PX = 0.2
@@ -58,14 +58,18 @@ class Cell:
         return _core.Problem(self.lens, self.parameters, points, radii, pixels, offsets, self.motions)
 
     @cached_property
-    def _measured(self) -> tuple[FloatArray, FloatArray, FloatArray, list[int]]:
+    def _measured(self) -> tuple[FloatArray, FloatArray, FloatArray, IndexArray]:
         P, K = len(self.points), self.views
         points = np.tile(self.points, (K, 1))
-        return points, np.zeros(K * P), self.pixels.reshape(-1, 2), list(range(0, K * P + 1, P))
+        return points, np.zeros(K * P), self.pixels.reshape(-1, 2), np.arange(0, K * P + 1, P)
 
     def model(self) -> _core.Model:
         """Return the assumptions: the robot exact, one pixel noise."""
-        return _core.Model(np.full(self.views, SIGMA_PX))
+        return _core.Model(self._sigmas_px)
+
+    @cached_property
+    def _sigmas_px(self) -> FloatArray:
+        return np.full(self.views, SIGMA_PX)
 
 
 def board(points: int) -> FloatArray:

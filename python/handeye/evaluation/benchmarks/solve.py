@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from handeye import _core
 from handeye.evaluation.benchmarks.options import Options
 from handeye.evaluation.benchmarks.peers.availability import MissingPeerError
 from handeye.evaluation.benchmarks.peers.solvers import PEERS
@@ -43,7 +42,7 @@ def ours(cell: Cell) -> Callable[[], tuple[FloatArray, FloatArray]]:
 
     def solve() -> tuple[FloatArray, FloatArray]:
         found = cell.problem().solve(cell.X_start, cell.Y_start, cell.model(), cost_tolerance=COST_TOLERANCE)
-        _ = _core.Belief(found.information).covariance
+        _ = found.covariance
         return found.x, found.y
 
     return solve

@@ -52,7 +52,7 @@ pub(super) struct Optics {
 pub(super) struct Look<'a, const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> {
     pub x: &'a [f64; 12],
     pub y: &'a [f64; 12],
-    /// Motions of each group, the robot's error included.
+    /// Motions of each group with the robot's errors; none where the robot is exact.
     pub motions: &'a [[Row; 12]],
     /// `1 / sigma^2` of each group's pixels.
     pub information: &'a [Row],
@@ -75,8 +75,9 @@ impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> Kernel
         let how = How::<DISTORTED, FULLY, ALIKE> { optics: self.optics, loss: self.loss };
         for (g, group) in self.measurements.groups.iter().enumerate() {
             let out = &mut self.out[g];
+            let motions = self.motions.get(g).unwrap_or(&group.motions);
             for at in (0..MAX_LANES).step_by(S::LANES) {
-                let before_y = left_product(simd, self.x, &load(simd, &self.motions[g], at));
+                let before_y = left_product(simd, self.x, &load(simd, motions, at));
                 let pose = right_product(simd, &before_y, self.y);
                 let weight = simd.load(&self.information[g][at..]) * squared_focal;
                 let mut view = View::new(simd, aspect, weight);

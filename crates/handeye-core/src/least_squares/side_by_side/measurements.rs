@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use nalgebra::Vector2;
-
-use crate::camera::Feature;
+use super::normal::set_lane;
+use crate::lanes::entries;
 use crate::least_squares::Problem;
 use crate::simd::MAX_LANES;
 
@@ -31,6 +30,8 @@ pub(in crate::least_squares) struct Group {
     pub counts: Row,
     /// Up to here every lane has a point; the rest repeats a lane's first.
     pub full: usize,
+    /// As the robot reports them.
+    pub motions: [Row; 12],
     pub points: Vec<Point>,
     /// As many as points, or none where every point counts alike.
     pub whitening: Vec<Whitening>,
@@ -57,7 +58,11 @@ impl Measurements {
         let cost =
             |parts: usize| (views.len() * parts).div_ceil(MAX_LANES) * (longest.div_ceil(parts) + GROUP_COST);
         let parts = if !whole && cost(2) < cost(1) { 2 } else { 1 };
-        let lanes: Vec<Range<usize>> = views.iter().flat_map(|k| split(problem.samples(*k), parts)).collect();
+        let split = |k: &usize| {
+            let k = *k;
+            split(problem.samples(k), parts).map(move |samples| (k, samples))
+        };
+        let lanes: Vec<(usize, Range<usize>)> = views.iter().flat_map(split).collect();
         Some(Self { groups: lanes.chunks(MAX_LANES).map(|lanes| group(problem, lanes)).collect(), parts })
     }
 }
@@ -72,43 +77,44 @@ fn split(samples: Range<usize>, parts: usize) -> impl Iterator<Item = Range<usiz
     (0..parts).map(move |i| bound(i)..bound(i + 1))
 }
 
-fn group(problem: &Problem, lanes: &[Range<usize>]) -> Group {
+/// Of views and the samples in each lane.
+fn group(problem: &Problem, lanes: &[(usize, Range<usize>)]) -> Group {
     const ZERO: Row = [0.0; MAX_LANES];
     // A lane without a view repeats the first.
-    let samples = |lane: usize| lanes[if lane < lanes.len() { lane } else { 0 }].clone();
-    let counts: [usize; MAX_LANES] = std::array::from_fn(|lane| samples(lane).len());
+    let lane = |i: usize| &lanes[if i < lanes.len() { i } else { 0 }];
+    let counts: [usize; MAX_LANES] = std::array::from_fn(|i| lane(i).1.len());
     let longest = counts.iter().copied().max().unwrap_or(0);
+    let mut motions = [ZERO; 12];
+    for i in 0..MAX_LANES {
+        set_lane(&mut motions, i, &entries(problem.motion(lane(i).0)));
+    }
     let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|i| problem.camera().parameters[i]);
     let inverse_focal = [1.0 / fx, 1.0 / fy];
-    let whitened = problem.whitening(0).is_some();
+    let features: [_; MAX_LANES] = std::array::from_fn(|i| &problem.features()[lane(i).1.clone()]);
+    let pixels: [_; MAX_LANES] = std::array::from_fn(|i| &problem.pixels()[lane(i).1.clone()]);
     let mut points = vec![Point { position: [ZERO; 3], seen: [ZERO; 2] }; longest];
-    let mut whitening = vec![[ZERO; 3]; if whitened { longest } else { 0 }];
-    for lane in 0..MAX_LANES {
-        let samples = samples(lane);
-        let (features, pixels) = (&problem.features()[samples.clone()], &problem.pixels()[samples.clone()]);
-        let set = |point: &mut Point, feature: &Feature, pixel: &Vector2<f64>| {
+    for (n, point) in points.iter_mut().enumerate() {
+        for i in 0..MAX_LANES {
+            let own = if n < counts[i] { n } else { 0 };
+            let (feature, pixel) = (&features[i][own], &pixels[i][own]);
             for axis in 0..3 {
-                point.position[axis][lane] = feature.position[axis];
+                point.position[axis][i] = feature.position[axis];
             }
-            point.seen[0][lane] = (pixel.x - cx) * inverse_focal[0];
-            point.seen[1][lane] = (pixel.y - cy) * inverse_focal[1];
-        };
-        let (own, spare) = points.split_at_mut(samples.len());
-        for (point, (feature, pixel)) in own.iter_mut().zip(features.iter().zip(pixels)) {
-            set(point, feature, pixel);
+            point.seen[0][i] = (pixel.x - cx) * inverse_focal[0];
+            point.seen[1][i] = (pixel.y - cy) * inverse_focal[1];
         }
-        for point in spare {
-            set(point, &features[0], &pixels[0]);
-        }
-        for (i, rows) in whitening.iter_mut().enumerate() {
-            let sample = if i < samples.len() { samples.start + i } else { samples.start };
-            if let Some(w) = problem.whitening(sample) {
-                for (row, value) in rows.iter_mut().zip([w.m11, w.m21, w.m22]) {
-                    row[lane] = value;
-                }
+    }
+    let whitened = problem.whitening(0).is_some();
+    let mut whitening = vec![[ZERO; 3]; if whitened { longest } else { 0 }];
+    for (n, rows) in whitening.iter_mut().enumerate() {
+        for i in 0..MAX_LANES {
+            let samples = &lane(i).1;
+            let own = if n < samples.len() { samples.start + n } else { samples.start };
+            if let Some(w) = problem.whitening(own) {
+                set_lane(rows, i, &[w.m11, w.m21, w.m22]);
             }
         }
     }
     let full = counts.into_iter().min().unwrap_or(0);
-    Group { counts: counts.map(|count| count as f64), full, points, whitening }
+    Group { counts: counts.map(|count| count as f64), full, motions, points, whitening }
 }

@@ -17,9 +17,10 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 use self::look::{Look, Optics, Sight};
 pub(super) use self::measurements::Measurements;
 use self::measurements::Row;
-use self::normal::{Correct, Desk, Errors, Matrix12, Noise, Normal, Vector12, correction, lane, set_lane};
-use self::step::Step;
-use super::engine::{Engine, Proposal, is_degenerate};
+pub(super) use self::normal::Desk;
+use self::normal::{Correct, Errors, Noise, Normal, correction, lane, set_lane};
+use self::step::{Equations, Step, Vector12};
+use super::engine::{Engine, Proposal, judge};
 use super::loss::Loss;
 use super::model::{Model, Side};
 use super::problem::Problem;
@@ -28,15 +29,14 @@ use super::solver::{Options, Start};
 use crate::camera::Lens;
 use crate::lanes::entries;
 use crate::se3::Se3;
-use crate::simd::{MAX_LANES, VectorUnit, dispatch};
+use crate::simd::{MAX_LANES, dispatch};
 
 /// What changes from step to step.
 struct State {
     x: Se3,
     y: Se3,
-    /// Motions of each group with the robot's errors.
+    /// Motions of each group with the robot's errors, and these; none for an exact robot.
     motions: Vec<[Row; 12]>,
-    /// One per group, or none for an exact robot.
     errors: Vec<Errors>,
     sights: Vec<Sight>,
     cost: f64,
@@ -47,19 +47,15 @@ pub(super) struct SideBySide<'a> {
     model: &'a Model,
     loss: Loss,
     views: &'a [usize],
-    unit: VectorUnit,
     measurements: &'a Measurements,
     optics: Optics,
     /// `1 / sigma^2` of the pixels of each group.
     information: Vec<Row>,
-    /// As the robot reports them.
-    motions: Vec<[Row; 12]>,
     current: State,
     trial: State,
-    h: Matrix12,
-    g: Vector12,
+    equations: Equations,
     step: Vector12,
-    desk: Desk,
+    desk: &'a mut Desk,
 }
 
 /// Whether the engine can do it: corners, a lens of the kind that lanes know, and nothing free but `X` and `Y`.
@@ -76,27 +72,22 @@ impl<'a> SideBySide<'a> {
         views: &'a [usize],
         measurements: &'a Measurements,
         start: &Start,
-        unit: VectorUnit,
+        desk: &'a mut Desk,
     ) -> Result<Self, usize> {
         const ZERO: Row = [0.0; MAX_LANES];
-        let groups = measurements.groups.len();
-        let mut information = vec![ZERO; groups];
-        let mut motions = vec![[ZERO; 12]; groups];
-        for i in 0..groups * MAX_LANES {
-            // Lanes without a view repeat the first of their group, and count for nothing.
-            let (group, at) = (i / MAX_LANES, i % MAX_LANES);
-            let own = views.get(i / measurements.parts);
-            let k = *own.unwrap_or(&views[group * MAX_LANES / measurements.parts]);
-            information[group][at] = own.map_or(0.0, |k| model.pixel_sigma[*k].powi(-2));
-            set_lane(&mut motions[group], at, &entries(problem.motion(k)));
+        let groups = &measurements.groups;
+        // Lanes without a view repeat the first of their group, and count for nothing.
+        let mut information = vec![ZERO; groups.len()];
+        for (k, lanes) in views.iter().zip(information.as_flattened_mut().chunks_mut(measurements.parts)) {
+            lanes.fill(1.0 / (model.pixel_sigma[*k] * model.pixel_sigma[*k]));
         }
-        let noisy = if model.robot.is_some() { groups } else { 0 };
+        let noisy = if model.robot.is_some() { &groups[..] } else { &[] };
         let state = || State {
             x: start.x,
             y: start.y,
-            motions: motions.clone(),
-            errors: vec![Errors::new(); noisy],
-            sights: vec![Sight::new(); groups],
+            motions: noisy.iter().map(|group| group.motions).collect(),
+            errors: noisy.iter().map(|_| Errors::new()).collect(),
+            sights: groups.iter().map(|_| Sight::new()).collect(),
             cost: 0.0,
         };
         let camera = problem.camera();
@@ -105,17 +96,14 @@ impl<'a> SideBySide<'a> {
             model,
             loss: options.loss,
             views,
-            unit,
             measurements,
             optics: Optics { parameters: camera.parameters, max_squared_radius: camera.max_squared_radius() },
             information,
             current: state(),
             trial: state(),
-            motions,
-            h: Matrix12::zeros(),
-            g: Vector12::zeros(),
+            equations: Equations::new(),
             step: Vector12::zeros(),
-            desk: Desk::new(),
+            desk,
         };
         engine.look()?;
         std::mem::swap(&mut engine.current, &mut engine.trial);
@@ -130,7 +118,7 @@ impl<'a> SideBySide<'a> {
         let alike = self.loss == Loss::Squared && self.problem.whitening(0).is_none();
         macro_rules! look {
             ($($flag:literal),*) => {
-                dispatch(self.unit, Look::<$($flag),*> {
+                dispatch(self.desk.unit, Look::<$($flag),*> {
                     x: &x,
                     y: &y,
                     motions: &trial.motions,
@@ -150,16 +138,19 @@ impl<'a> SideBySide<'a> {
             (Lens::BrownConrady8 | Lens::BrownConrady12, true) => look!(true, true, true),
             (Lens::BrownConrady8 | Lens::BrownConrady12, false) => look!(true, true, false),
         }
-        let mut cost = 0.0;
         let parts = self.measurements.parts;
-        for (i, k) in self.views.iter().flat_map(|k| std::iter::repeat_n(k, parts)).enumerate() {
-            let (sight, at) = (&trial.sights[i / MAX_LANES], i % MAX_LANES);
-            if sight.whole[at] == 0.0 || !sight.cost[at].is_finite() {
-                return Err(*k);
-            }
-            cost += sight.cost[at];
-            if let Some(errors) = trial.errors.get(i / MAX_LANES) {
-                cost += correction(errors, at).norm_squared();
+        let mut cost = 0.0;
+        for (group, (sight, views)) in
+            trial.sights.iter().zip(self.views.chunks(MAX_LANES / parts)).enumerate()
+        {
+            for at in 0..views.len() * parts {
+                if sight.whole[at] == 0.0 || !sight.cost[at].is_finite() {
+                    return Err(views[at / parts]);
+                }
+                cost += sight.cost[at];
+                if let Some(errors) = trial.errors.get(group) {
+                    cost += correction(errors, at).norm_squared();
+                }
             }
         }
         trial.cost = cost + self.model.chain_prior.as_ref().map_or(0.0, |p| p.cost(&trial.x, &trial.y));
@@ -195,19 +186,16 @@ impl<'a> SideBySide<'a> {
         let noise = self.model.robot.as_ref().map(|robot| Noise {
             side: robot.side,
             x: &x,
-            motions: &self.motions,
+            groups: &self.measurements.groups,
             errors: &mut self.current.errors,
             damping,
         });
-        (self.h, self.g) =
-            dispatch(self.unit, Normal { sights: &self.current.sights, noise, desk: &mut self.desk });
+        let (unit, desk, equations) = (self.desk.unit, &mut *self.desk, &mut self.equations);
+        dispatch(unit, Normal { sights: &self.current.sights, noise, desk, equations });
         if let Some(prior) = &self.model.chain_prior {
             let (x, y) = (&self.current.x, &self.current.y);
             for (at, (information, gradient)) in [(0, prior.normal(true, x)), (6, prior.normal(false, y))] {
-                let mut block = self.h.fixed_view_mut::<6, 6>(at, at);
-                block += information;
-                let mut rows = self.g.fixed_rows_mut::<6>(at);
-                rows += gradient;
+                self.equations.add(at, &information, &gradient);
             }
         }
     }
@@ -220,16 +208,17 @@ impl Engine for SideBySide<'_> {
 
     fn propose(&mut self, damping: f64) -> Option<Proposal> {
         self.assemble(damping);
-        let mut penalty = 0.0;
-        let diagonal: Vector12 = Vector12::from_fn(|i, _| damping * self.h[(i, i)].max(1e-12));
-        self.step = dispatch(self.unit, Step { h: &self.h, g: &self.g, diagonal: &diagonal })?;
+        let equations = &self.equations;
+        let damping = equations.diagonal().map(|entry| damping * entry.max(1e-12));
+        self.step = dispatch(self.desk.unit, Step { equations, damping: &damping })?;
         if !self.step.iter().all(|x| x.is_finite()) {
             return None;
         }
-        for i in 0..12 {
-            penalty += diagonal[i] * self.step[i] * self.step[i];
-        }
-        Some(Proposal { predicted: penalty - self.g.dot(&self.step), largest: self.step.amax() })
+        let penalty = damping.dot(&self.step.component_mul(&self.step));
+        Some(Proposal {
+            predicted: penalty - equations.gradient().dot(&self.step),
+            largest: self.step.amax(),
+        })
     }
 
     fn attempt(&mut self) -> Option<f64> {
@@ -239,7 +228,7 @@ impl Engine for SideBySide<'_> {
         self.trial.y = Se3::exp(&xi_y) * self.current.y;
         if self.model.robot.is_some() {
             dispatch(
-                self.unit,
+                self.desk.unit,
                 Correct {
                     step: &self.step,
                     sights: &self.current.sights,
@@ -262,7 +251,8 @@ impl Engine for SideBySide<'_> {
             prior_information.view_mut((0, 0), (6, 6)).copy_from(&prior.normal(true, &self.current.x).0);
             prior_information.view_mut((6, 6), (6, 6)).copy_from(&prior.normal(false, &self.current.y).0);
         }
-        let information = DMatrix::from_column_slice(12, 12, self.h.as_slice());
+        let information = self.equations.information();
+        let (factor, ending) = judge(&information, ending);
         let mut correction_log_determinant = 0.0;
         let parts = self.measurements.parts;
         let views = self.views.iter().enumerate().map(|(i, k)| {
@@ -298,8 +288,9 @@ impl Engine for SideBySide<'_> {
             camera: *self.problem.camera(),
             board_scale: 0.0,
             kinematic: DVector::zeros(0),
-            ending: if is_degenerate(&information) { Ending::Degenerate } else { ending },
+            ending,
             information,
+            factor,
             prior_information,
             cost: self.current.cost,
             initial_cost,

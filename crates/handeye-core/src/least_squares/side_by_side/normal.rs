@@ -1,15 +1,13 @@
 //! From the quadratics of views to the normal equations of `[xi_x; xi_y]`, lanes = views.
 
-use nalgebra::{SMatrix, SVector, Vector6};
+use nalgebra::Vector6;
 
 use super::look::Sight;
-use super::measurements::Row;
+use super::measurements::{Group, Row};
+use super::step::{Equations, Vector12};
 use crate::lanes::{UPPER, left_product, load, store, upper};
 use crate::least_squares::Side;
-use crate::simd::{Kernel, MAX_LANES, Simd, Vector, ln};
-
-pub(super) type Matrix12 = SMatrix<f64, 12, 12>;
-pub(super) type Vector12 = SVector<f64, 12>;
+use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, ln};
 
 /// The robot's error in a group of views at one state, and what eliminating it gave.
 #[derive(Clone)]
@@ -43,8 +41,8 @@ impl Errors {
 pub(super) struct Noise<'a> {
     pub side: Side,
     pub x: &'a [f64; 12],
-    /// Motions as the robot reports them.
-    pub motions: &'a [[Row; 12]],
+    /// With the motions as the robot reports them.
+    pub groups: &'a [Group],
     pub errors: &'a mut [Errors],
     pub damping: f64,
 }
@@ -54,30 +52,32 @@ pub(super) struct Normal<'a> {
     pub sights: &'a [Sight],
     pub noise: Option<Noise<'a>>,
     pub desk: &'a mut Desk,
+    pub equations: &'a mut Equations,
 }
 
-/// Room for the sums: blocks of the information and of the gradient, each entry by lanes.
+/// A vector unit and room for its sums: blocks of the information and of the gradient, each entry by lanes.
 #[repr(C, align(64))]
-pub(super) struct Desk {
+pub(in crate::least_squares) struct Desk {
     xx: [Row; UPPER],
     yy: [Row; UPPER],
     xy: [Row; 36],
     x: [Row; 6],
     y: [Row; 6],
+    pub unit: VectorUnit,
 }
 
 impl Desk {
-    pub fn new() -> Self {
+    pub fn new(unit: VectorUnit) -> Self {
         const ZERO: Row = [0.0; MAX_LANES];
-        Self { xx: [ZERO; UPPER], yy: [ZERO; UPPER], xy: [ZERO; 36], x: [ZERO; 6], y: [ZERO; 6] }
+        Self { xx: [ZERO; UPPER], yy: [ZERO; UPPER], xy: [ZERO; 36], x: [ZERO; 6], y: [ZERO; 6], unit }
     }
 }
 
 impl Kernel for Normal<'_> {
-    type Output = (Matrix12, Vector12);
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(mut self, simd: S) -> Self::Output {
+    fn run<S: Simd>(mut self, simd: S) {
         for (g, sight) in self.sights.iter().enumerate() {
             for at in (0..MAX_LANES).step_by(S::LANES) {
                 let mut information = load(simd, &sight.information, at);
@@ -89,7 +89,7 @@ impl Kernel for Normal<'_> {
                 add(simd, self.desk, g == 0 && at == 0, &information, &gradient, &c);
             }
         }
-        total(simd, self.desk)
+        total(simd, self.desk, self.equations);
     }
 }
 
@@ -172,27 +172,18 @@ fn put<S: Simd>(simd: S, rows: &mut [Row], first: bool, values: &[S::Vector]) {
 
 /// The sums over the lanes.
 #[inline(always)]
-fn total<S: Simd>(simd: S, desk: &Desk) -> (Matrix12, Vector12) {
-    let mut h = Matrix12::zeros();
-    let mut g = Vector12::zeros();
+fn total<S: Simd>(simd: S, desk: &Desk, equations: &mut Equations) {
     for i in 0..6 {
         for j in i..6 {
-            let xx = simd.load(&desk.xx[upper(i, j)]).sum();
-            let yy = simd.load(&desk.yy[upper(i, j)]).sum();
-            h[(i, j)] = xx;
-            h[(j, i)] = xx;
-            h[(6 + i, 6 + j)] = yy;
-            h[(6 + j, 6 + i)] = yy;
+            equations.set(i, j, simd.load(&desk.xx[upper(i, j)]).sum());
+            equations.set(6 + i, 6 + j, simd.load(&desk.yy[upper(i, j)]).sum());
         }
         for j in 0..6 {
-            let xy = simd.load(&desk.xy[6 * i + j]).sum();
-            h[(i, 6 + j)] = xy;
-            h[(6 + j, i)] = xy;
+            equations.set(i, 6 + j, simd.load(&desk.xy[6 * i + j]).sum());
         }
-        g[i] = simd.load(&desk.x[i]).sum();
-        g[6 + i] = simd.load(&desk.y[i]).sum();
+        equations.set_gradient(i, simd.load(&desk.x[i]).sum());
+        equations.set_gradient(6 + i, simd.load(&desk.y[i]).sum());
     }
-    (h, g)
 }
 
 /// Eliminates the robot's errors of a group: as `marginal::eliminate`.
@@ -207,7 +198,7 @@ fn eliminate<S: Simd>(
 ) {
     let one = simd.splat(1.0);
     let errors = &mut noise.errors[g];
-    let t = to_error(simd, noise.side, noise.x, &noise.motions[g], &errors.root, at);
+    let t = to_error(simd, noise.side, noise.x, &noise.groups[g].motions, &errors.root, at);
     let (m, grad) = (*information, *gradient);
     // M T, and H = I + T' M T with its damping.
     let mut mt = t;
