@@ -18,11 +18,13 @@ mod portable;
 #[cfg(test)]
 mod tests;
 mod trigonometry;
+mod twin;
 
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
 pub(crate) use logarithm::ln;
 pub(crate) use trigonometry::{LARGEST_ANGLE, sin_cos};
+pub(crate) use twin::Twin;
 
 /// Doubles of the widest vector.
 pub(crate) const MAX_LANES: usize = 8;
@@ -104,7 +106,7 @@ pub(crate) trait Simd: Copy {
     /// Its vectors.
     type Vector: Vector;
 
-    /// Doubles in a vector; a power of two, at most [`MAX_LANES`].
+    /// Doubles in a vector; a power of two, at most [`MAX_LANES`] in one of a unit.
     const LANES: usize;
 
     /// The same value in all lanes.

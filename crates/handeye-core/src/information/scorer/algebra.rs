@@ -3,7 +3,7 @@
 use super::block::{BLOCK, Block, Row};
 use super::forms::{Form, Moved, packed};
 use crate::lanes::{UPPER, load, upper};
-use crate::simd::{Kernel, Simd, Vector, ln};
+use crate::simd::{Kernel, Simd, Twin, Vector, ln};
 
 /// Pivots of a covariance below this fraction of their diagonal are rounding.
 pub(super) const NULL_PIVOT: f64 = 1e-15;
@@ -32,25 +32,36 @@ impl Kernel for Determinant<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let constant: &[f64; UPPER] = self.form.constant.first_chunk().expect("six rows");
-        for at in (0..BLOCK).step_by(S::LANES) {
-            let mut s = [simd.splat(0.0); UPPER];
-            for i in 0..UPPER {
-                s[i] = simd.splat(constant[i]);
-            }
-            if let Some(moved) = &self.form.moved {
-                let u = spread(simd, moved, &load(simd, &self.block.before_y, at));
-                add_square(&u, &mut s);
-            }
-            let mut m = [simd.splat(0.0); UPPER];
+        let twin = Twin(simd);
+        for at in (0..BLOCK).step_by(2 * S::LANES) {
+            let first = self.form.covariance(simd, self.block, at);
+            let s = twin.pair(first, self.form.covariance(simd, self.block, at + S::LANES));
+            let mut m = [twin.splat(0.0); UPPER];
             each!(I in [0 1 2 3 4 5] {
                 let row = &self.block.information[packed(self.size, I, I)..][..6 - I];
                 for j in I..6 {
-                    m[upper(I, j)] = simd.load(&row[j - I][at..]);
+                    m[upper(I, j)] = twin.load(&row[j - I][at..]);
                 }
             });
-            determinant(simd, s, simd.splat(self.scale), m).store(&mut self.out[at..]);
+            determinant(twin, s, twin.splat(self.scale), m).store(&mut self.out[at..]);
         }
+    }
+}
+
+impl Form {
+    /// The covariance of the twist.
+    #[inline(always)]
+    fn covariance<S: Simd>(&self, simd: S, block: &Block, at: usize) -> [S::Vector; UPPER] {
+        let constant: &[f64; UPPER] = self.constant.first_chunk().expect("six rows");
+        let mut s = [simd.splat(0.0); UPPER];
+        for i in 0..UPPER {
+            s[i] = simd.splat(constant[i]);
+        }
+        if let Some(moved) = &self.moved {
+            let u = spread(simd, moved, &load(simd, &block.before_y, at));
+            add_square(&u, &mut s);
+        }
+        s
     }
 }
 
