@@ -7,8 +7,8 @@ use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
 use crate::lanes::{Bent, Window, bend, load};
 use crate::simd::{Kernel, Simd, Vector};
 
-/// Rows of `d pi / d [eta; c]` that are squared together: so many sums stay in registers.
-const TOGETHER: usize = 8;
+/// Points whose rows of `d pi / d [eta; c]` are squared together: a sum is fetched once for all of them.
+const TOGETHER: usize = 4;
 
 /// Most columns: the twist, all parameters of a lens, and the board's scale.
 const COLUMNS: usize = 6 + MAX_PARAMETERS + 1;
@@ -26,6 +26,15 @@ impl Column {
     /// Whether it is a parameter of the camera.
     pub fn is_of_camera(&self) -> bool {
         matches!(self, Self::Camera(_))
+    }
+
+    /// Whether it moves points along u, and along v.
+    fn moves(&self) -> [bool; 2] {
+        match self {
+            Self::Camera(0 | 2) => [true, false],
+            Self::Camera(1 | 3) => [false, true],
+            _ => [true, true],
+        }
     }
 }
 
@@ -47,8 +56,11 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool> Kernel
     fn run<S: Simd>(self, simd: S) {
         let zero = simd.splat(0.0);
         let size = 6 + self.columns.len();
-        // Column by column, so that one load serves two products.
-        let mut rows = [[zero; TOGETHER]; COLUMNS];
+        let mut moves = [[true; 2]; COLUMNS];
+        for (moves, column) in moves[6..].iter_mut().zip(self.columns) {
+            *moves = column.moves();
+        }
+        let mut rows: Rows<S::Vector> = [[[zero; TOGETHER]; 2]; COLUMNS];
         for at in (0..BLOCK).step_by(S::LANES) {
             for sum in self.block.information.iter_mut() {
                 zero.store(&mut sum[at..]);
@@ -58,25 +70,28 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool> Kernel
             let mut filled = 0;
             for (y, z, along) in self.target.patches.iter().flat_map(Patch::lines) {
                 for x in along {
-                    let point = [x, y, z];
-                    seen = seen + self.look::<S>(simd, &pose, point, &mut rows, filled);
-                    filled += 2;
+                    seen = seen + self.look::<S>(simd, &pose, [x, y, z], &mut rows, filled);
+                    filled += 1;
                     if filled == TOGETHER {
-                        add_squares(simd, &rows[..size], &mut self.block.information, at);
+                        add_squares(simd, &rows[..size], &moves, &mut self.block.information, at);
                         filled = 0;
                     }
                 }
             }
             if filled > 0 {
                 for column in &mut rows[..size] {
-                    column[filled..].fill(zero);
+                    column[0][filled..].fill(zero);
+                    column[1][filled..].fill(zero);
                 }
-                add_squares(simd, &rows[..size], &mut self.block.information, at);
+                add_squares(simd, &rows[..size], &moves, &mut self.block.information, at);
             }
             seen.store(&mut self.block.seen[at..]);
         }
     }
 }
+
+/// Derivatives of points: column by column, of u and of v.
+type Rows<V> = [[[V; TOGETHER]; 2]; COLUMNS];
 
 impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
     WidePoints<'_, DISTORTED, RATIONAL, PRISM>
@@ -88,7 +103,7 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
         simd: S,
         pose: &[S::Vector; 12],
         point: [f64; 3],
-        rows: &mut [[S::Vector; TOGETHER]; COLUMNS],
+        rows: &mut Rows<S::Vector>,
         at: usize,
     ) -> S::Vector {
         let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
@@ -115,13 +130,12 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
         for (row, (a, b)) in jacobian.into_iter().enumerate() {
             let s = a.mul_add(x, b * y);
             let (aw, bw, sw) = (a * w, b * w, -(s * w));
-            let to = at + row;
-            rows[0][to] = aw;
-            rows[1][to] = bw;
-            rows[2][to] = sw;
-            rows[3][to] = -y.mul_add(s, b);
-            rows[4][to] = x.mul_add(s, a);
-            rows[5][to] = b.mul_add(x, -(a * y));
+            rows[0][row][at] = aw;
+            rows[1][row][at] = bw;
+            rows[2][row][at] = sw;
+            rows[3][row][at] = -y.mul_add(s, b);
+            rows[4][row][at] = x.mul_add(s, a);
+            rows[5][row][at] = b.mul_add(x, -(a * y));
         }
         let inverse_focal = simd.splat(1.0 / p[0]);
         for (column, rows) in self.columns.iter().zip(&mut rows[6..]) {
@@ -143,8 +157,8 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
                     (u, v * aspect)
                 }
             };
-            rows[at] = u.keep(in_sight);
-            rows[at + 1] = v.keep(in_sight);
+            rows[0][at] = u.keep(in_sight);
+            rows[1][at] = v.keep(in_sight);
         }
         one.keep(in_sight)
     }
@@ -179,27 +193,59 @@ fn coefficient<S: Simd>(
     (x * radial, y * radial)
 }
 
-/// Adds the squares of the rows to the information.
+/// Adds the squares of the rows to the information; what moves no point along an axis has no product there.
 #[inline(always)]
 fn add_squares<S: Simd>(
     simd: S,
-    columns: &[[S::Vector; TOGETHER]],
+    columns: &[[[S::Vector; TOGETHER]; 2]],
+    moves: &[[bool; 2]],
     information: &mut [[f64; BLOCK]],
     at: usize,
 ) {
     let size = columns.len();
-    for (i, left) in columns.iter().enumerate() {
-        let sums = &mut information[packed(size, i, i)..=packed(size, i, size - 1)];
-        for (sum, right) in sums.iter_mut().zip(&columns[i..]) {
-            let mut even = simd.load(&sum[at..]);
-            let mut odd = left[1] * right[1];
-            for k in 0..TOGETHER / 2 {
-                even = left[2 * k].mul_add(right[2 * k], even);
-                if k > 0 {
-                    odd = left[2 * k + 1].mul_add(right[2 * k + 1], odd);
-                }
+    let mut i = 0;
+    while i < size {
+        // Two columns at a time, in registers: what is fetched of a third serves both.
+        let next = (i + 1).min(size - 1);
+        let two = next > i && moves[i] == moves[next];
+        let (first, second) = (columns[i], columns[next]);
+        for j in i..size {
+            let moved = [moves[i][0] && moves[j][0], moves[i][1] && moves[j][1]];
+            let right = columns[j];
+            let sum = &mut information[packed(size, i, j)][at..];
+            product(&first, &right, moved, simd.load(sum)).store(sum);
+            if two && j > i {
+                let sum = &mut information[packed(size, next, j)][at..];
+                product(&second, &right, moved, simd.load(sum)).store(sum);
             }
-            (even + odd).store(&mut sum[at..]);
+        }
+        i += if two { 2 } else { 1 };
+    }
+}
+
+/// `sum + left' right` over the axes along which both move.
+#[inline(always)]
+fn product<V: Vector>(
+    left: &[[V; TOGETHER]; 2],
+    right: &[[V; TOGETHER]; 2],
+    moved: [bool; 2],
+    mut sum: V,
+) -> V {
+    if moved == [true, true] {
+        let mut along_v = left[1][0] * right[1][0];
+        sum = left[0][0].mul_add(right[0][0], sum);
+        for k in 1..TOGETHER {
+            sum = left[0][k].mul_add(right[0][k], sum);
+            along_v = left[1][k].mul_add(right[1][k], along_v);
+        }
+        return sum + along_v;
+    }
+    for axis in 0..2 {
+        if moved[axis] {
+            for k in 0..TOGETHER {
+                sum = left[axis][k].mul_add(right[axis][k], sum);
+            }
         }
     }
+    sum
 }
