@@ -6,6 +6,7 @@
 
 use pyo3::prelude::*;
 
+mod alignment;
 mod camera;
 mod closed_form;
 mod convert;
@@ -22,6 +23,7 @@ mod problem;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    alignment::register(module)?;
     camera::register(module)?;
     closed_form::register(module)?;
     evidence::register(module)?;
