@@ -20,6 +20,7 @@ mod picture;
 mod planar_pose;
 mod planning;
 mod problem;
+mod view_sets;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -33,6 +34,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     planar_pose::register(module)?;
     planning::register(module)?;
     problem::register(module)?;
+    view_sets::register(module)?;
     model::register(module)?;
     information::register(module)?;
     Ok(())
