@@ -306,9 +306,10 @@ class Solution:
 class ViewSets:
     """Views linearised at X and Y, to be weighed in sets under levels of the robot's noise.
 
-    The twist between chain and image of view k is ``deviations[k] = noise - rows[k] theta``; its noise is that of the
-    image, `covariances[k]`, and that of the robot, which acts through `from_left[k]` or `from_right[k]`. `prior` (n, n)
-    and `prior_right` (n,): information on theta without the views, and its right side.
+    The twist between chain and image of view k is ``deviations[k] = noise - rows[k] theta``; its noise is
+    that of the image, `covariances[k]`, and that of the robot, which acts through `from_left[k]` or
+    `from_right[k]`. `prior` (n, n) and `prior_right` (n,): information on theta without the views, and its
+    right side.
     """
 
     def __init__(
@@ -330,7 +331,8 @@ class ViewSets:
     ) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64]]:
         """Covariances (H, n, n) and means (H, n) of theta and log-likelihoods (H,) of a set of views.
 
-        A level h of the noise acts on the `left` of the motion or on the right, with standard deviations per axis.
+        A level h of the noise acts on the `left` of the motion or on the right, with standard deviations
+        per axis.
         """
 
 # Information

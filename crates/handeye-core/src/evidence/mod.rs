@@ -14,6 +14,7 @@ mod links;
 mod posterior;
 mod smooth;
 mod systems;
+mod twists;
 mod view_sets;
 mod weigh;
 mod weigh_links;

@@ -239,10 +239,10 @@ def refine(
     """
     weight = np.array([1.0] * 3 + [lever_m] * 3)
     N, V = motions.shape[:2]
-    back = inverted(poses)
+    back, x, y = inverted(poses), X, Y
     for _ in range(GAUSS_NEWTON_STEPS):
-        forward = X[:, np.newaxis] @ motions
-        error = twists(forward @ Y[:, np.newaxis] @ back)
+        forward = x[:, np.newaxis] @ motions
+        error = twists(forward @ y[:, np.newaxis] @ back)
         to_y = _core.se3_adjoint(forward.reshape(-1, 4, 4)).reshape(N, V, 6, 6)
         rows = np.concatenate([np.broadcast_to(np.eye(6), to_y.shape), to_y], axis=3)
         rows = (rows * weight[:, np.newaxis]).reshape(N, 6 * V, 12)
@@ -252,7 +252,7 @@ def refine(
         normal[:, diagonal, diagonal] = normal[:, diagonal, diagonal] * (1 + 1e-9) + 1e-12
         right = transposed @ (error * weight).reshape(N, 6 * V, 1)
         step = -np.asarray(np.linalg.solve(normal, right), dtype=np.float64)[..., 0]
-        X, Y = _core.se3_exp(step[:, :6]) @ X, _core.se3_exp(step[:, 6:]) @ Y
+        x, y = _core.se3_exp(step[:, :6]) @ x, _core.se3_exp(step[:, 6:]) @ y
         if np.abs(step).max() < SMALLEST_STEP:
             break
-    return X, Y
+    return x, y
