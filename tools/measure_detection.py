@@ -72,12 +72,6 @@ def off(pixels: np.ndarray, random: np.random.Generator) -> Prediction:
     return Prediction((pixels - middle) @ turn + middle + random.normal(scale=ERROR_PX, size=2), MARGIN_PX)
 
 
-def draw(target: Target) -> None:
-    """Draw the picture of a target, which is done once for all its images."""
-    board = printed(target)
-    _ = board.steepest, board.inverse
-
-
 def timed(image: np.ndarray, target: Target, predicted: Prediction | None, rounds: int = 3) -> float:
     """Least processor time in ms."""
     times: list[float] = []
@@ -148,7 +142,7 @@ def rendered(first: int, count: int, file: Path | None) -> None:
         pose = posed(target, float(random.uniform(0.2, 0.75)), random)
         image, truth = renderers[name, ground].image(pose, random), projected(target, pose)
         prediction = off(truth, random)
-        draw(target)
+        printed(target)
         began = time.process_time()
         whole = detect(image, target)
         middle = time.process_time()
@@ -190,7 +184,7 @@ def public(root: Path) -> None:
         for shot in images.shots:
             image = read_image(images.image_path(shot))
             size = image.shape[::-1]
-            draw(images.target)
+            printed(images.target)
             began = time.process_time()
             whole = detect(image, images.target)
             middle = time.process_time()

@@ -9,7 +9,7 @@ A wrong shape, a parameter out of its range or a transform that is not rigid rai
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from numpy import bool_, float64, int64, uint8
+from numpy import bool_, float32, float64, int64, uint8
 from numpy.typing import ArrayLike, NDArray
 
 # Rigid transforms
@@ -115,6 +115,71 @@ def area_centroids(
     `image` (H, W) is contiguous; `centres` (N, 2) and `shapes` (N, 2, 2) are guesses, `x' S^-1 x = 1` for x
     from the centre to the edge; `gaps` (N,) are the free distances to the next spot in pixels.
     """
+
+def free_gaps(centres: ArrayLike, shapes: ArrayLike) -> NDArray[float64]:
+    """Narrowest free distances (N,) in pixels from the edge of each spot to that of another one, at least 1."""
+
+class PlaneMap:
+    """A map from the plane of a target, in metres, to pixels: a homography, and what a lens adds to it."""
+
+    @staticmethod
+    def fitted(plane: ArrayLike, pixels: ArrayLike) -> PlaneMap | None:
+        """The map that fits places (N, 2) and pixels (N, 2) best, least squares; None where there is none."""
+
+    def pixels(self, plane: ArrayLike) -> NDArray[float64]:
+        """Where places (N, 2) of the plane are in the image."""
+
+    def steps(self, plane: ArrayLike, half: float) -> NDArray[float64]:
+        """Pixels (N, 2, 2) per metre along each axis at places (N, 2), from both sides at `half` metres."""
+
+class Printed:
+    """The printed picture of a board, and what aligning an image with it needs."""
+
+    def __init__(
+        self,
+        picture: NDArray[float32],
+        low: tuple[float, float],
+        scale: float,
+        pitch: float,
+        light_px: int,
+    ) -> None:
+        """From `picture` (H, W), 0 for ink and 1 for paper.
+
+        `low` is the place in the plane of the outer corner of the first pixel, `scale` the pixels per metre,
+        `pitch` the metres from point to point; the light around a place is that of `light_px` across.
+        """
+
+    def align(
+        self,
+        image: NDArray[uint8],
+        plane: ArrayLike,
+        pixels: ArrayLike,
+        margin_px: float,
+        also_negative: bool,
+    ) -> Alignment | None:
+        """Where the board lies in `image` (H, W), contiguous; None where it is not there.
+
+        Places (N, 2) of the plane are expected at pixels (N, 2), give or take a margin. With `also_negative`
+        ink may be lighter than paper.
+        """
+
+    def drawn(self, plane: ArrayLike) -> NDArray[float64]:
+        """What the picture has (N,) at places (N, 2) of the plane."""
+
+class Alignment:
+    """Where a board lies in an image."""
+
+    def places(self, plane: ArrayLike) -> NDArray[float64]:
+        """Where places (N, 2) of the plane are in the image."""
+
+    def steps(self, plane: ArrayLike) -> NDArray[float64]:
+        """Pixels (N, 2, 2) per metre along each axis at places (N, 2)."""
+
+    def seen(self, plane: ArrayLike) -> NDArray[float64]:
+        """Grey values (N,) at places (N, 2) of the plane, light where paper should be."""
+
+    def likeness(self, plane: ArrayLike) -> NDArray[float64]:
+        """How well image and picture agree, -1 to 1, one pitch around places (N, 2) of the plane."""
 
 # Closed-form starts
 
@@ -237,6 +302,38 @@ class Solution:
     def poses(self) -> NDArray[float64]: ...
     @property
     def correction_log_determinant(self) -> float: ...
+
+class ViewSets:
+    """Views linearised at X and Y, to be weighed in sets under levels of the robot's noise.
+
+    The twist between chain and image of view k is ``deviations[k] = noise - rows[k] theta``; its noise is
+    that of the image, `covariances[k]`, and that of the robot, which acts through `from_left[k]` or
+    `from_right[k]`. `prior` (n, n) and `prior_right` (n,): information on theta without the views, and its
+    right side.
+    """
+
+    def __init__(
+        self,
+        deviations: ArrayLike,
+        rows: ArrayLike,
+        covariances: ArrayLike,
+        from_left: ArrayLike,
+        from_right: ArrayLike,
+        prior: ArrayLike,
+        prior_right: ArrayLike,
+    ) -> None: ...
+    def fit(
+        self,
+        left: NDArray[bool_],
+        translation_m: ArrayLike,
+        rotation_rad: ArrayLike,
+        members: Sequence[int] | NDArray[int64],
+    ) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64]]:
+        """Covariances (H, n, n) and means (H, n) of theta and log-likelihoods (H,) of a set of views.
+
+        A level h of the noise acts on the `left` of the motion or on the right, with standard deviations
+        per axis.
+        """
 
 # Information
 

@@ -10,6 +10,7 @@ import pytest
 from handeye.detection import Detection, NotFound, Prediction, Reason, detect
 from handeye.detection.part import Part, jacobians, mapped
 from handeye.detection.predicted import where_expected
+from handeye.detection.registration import drawn
 from handeye.errors import InputError
 from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid, Target
 from scenes import CAMERAS, PINHOLE, TARGETS, Scene, scene
@@ -112,9 +113,14 @@ def test_a_prediction_elsewhere_costs_time_only(name: str, monkeypatch: pytest.M
     image = board.picture()
     whole = detect(image, board.target)
     seen = looks(monkeypatch)
-    for shift in ((260.0, 30.0), (45.0, 0.0), (5000.0, 0.0)):
+    for shift, margin_px in (
+        ((260.0, 30.0), 0.0),
+        ((45.0, 0.0), 0.0),
+        ((5000.0, 0.0), 0.0),
+        ((3.0, 0.0), 1e6),
+    ):
         seen.clear()
-        found = detect(image, board.target, predicted=predicted(board, shift, 0.0))
+        found = detect(image, board.target, predicted=predicted(board, shift, margin_px))
         assert isinstance(found, Detection), found
         np.testing.assert_array_equal(found.point_ids, whole.point_ids)
         assert np.abs(found.pixels - whole.pixels).max() < SAME_PX
@@ -188,7 +194,7 @@ def test_a_board_is_aligned_to_a_fraction_of_a_pixel(name: str, lens: str) -> No
     assert found.likeness(plane).min() > 0.8
     # What is drawn is what is seen.
     places = plane.mean(axis=0) + np.random.default_rng(0).uniform(-0.05, 0.05, (200, 2))
-    assert np.corrcoef(found.seen(places), found.drawn(places))[0, 1] > 0.9
+    assert np.corrcoef(found.seen(places), drawn(board.target, places))[0, 1] > 0.9
 
 
 def test_parts_map_places_and_shapes() -> None:

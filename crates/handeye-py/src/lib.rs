@@ -6,6 +6,7 @@
 
 use pyo3::prelude::*;
 
+mod alignment;
 mod camera;
 mod closed_form;
 mod convert;
@@ -19,9 +20,11 @@ mod picture;
 mod planar_pose;
 mod planning;
 mod problem;
+mod view_sets;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    alignment::register(module)?;
     camera::register(module)?;
     closed_form::register(module)?;
     evidence::register(module)?;
@@ -31,6 +34,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     planar_pose::register(module)?;
     planning::register(module)?;
     problem::register(module)?;
+    view_sets::register(module)?;
     model::register(module)?;
     information::register(module)?;
     Ok(())

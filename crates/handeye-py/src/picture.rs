@@ -3,7 +3,7 @@
 use handeye_core::error::Error;
 use handeye_core::picture::Picture;
 use handeye_core::picture::corner::{CornerFitter, CornerGuess, CornerKind};
-use handeye_core::picture::spot::{Spot, area_centroid};
+use handeye_core::picture::spot::{Spot, area_centroid, free_gaps as core_free_gaps};
 use numpy::{PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -13,7 +13,8 @@ use crate::errors::to_python;
 /// Registers the functions of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fit_corners, module)?)?;
-    module.add_function(wrap_pyfunction!(area_centroids, module)?)
+    module.add_function(wrap_pyfunction!(area_centroids, module)?)?;
+    module.add_function(wrap_pyfunction!(free_gaps, module)?)
 }
 
 /// Checks that all arguments have the length of the first.
@@ -24,7 +25,8 @@ fn same_length(py: Python<'_>, lengths: &[usize]) -> PyResult<()> {
     Err(to_python(py, Error::invalid(format!("arguments of different lengths: {lengths:?}"))))
 }
 
-fn picture<'a, T: numpy::Element + Copy + Into<f32>>(
+/// A contiguous array as a picture.
+pub fn picture<'a, T: numpy::Element + Copy + Into<f32>>(
     py: Python<'_>,
     image: &'a PyReadonlyArray2<'_, T>,
 ) -> PyResult<Picture<'a, T>> {
@@ -100,4 +102,18 @@ fn area_centroids<'py>(
         convert::array(py, &[n, 2], found.iter().flat_map(centre).collect()),
         convert::array(py, &[n, 2, 2], found.iter().flat_map(shape).collect()),
     ))
+}
+
+#[pyfunction]
+fn free_gaps<'py>(
+    py: Python<'py>,
+    centres: Array<'py>,
+    shapes: Array<'py>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let centres = convert::vectors::<2>(py, "centres", &centres)?;
+    let shapes = convert::matrices::<2, 2>(py, "shapes", &shapes)?;
+    same_length(py, &[centres.len(), shapes.len()])?;
+    let spots: Vec<_> =
+        centres.into_iter().zip(shapes).map(|(centre, shape)| Spot { centre, shape }).collect();
+    Ok(convert::array(py, &[spots.len()], core_free_gaps(&spots)))
 }

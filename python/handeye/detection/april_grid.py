@@ -1,20 +1,23 @@
 """Corners of the tags of an AprilGrid."""
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 
+from handeye import _core
 from handeye.detection.base import Detection, Image, NotFound, Reason, inside, ordered
 from handeye.detection.corner_fit import ASTRAY_PX, CornerKind, astray, fit_corners
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.markers import (
     LEAST_SHARE,
+    Bits,
     disagreement,
     find_markers,
     foreign_markers,
     from_neighbours,
-    readable,
 )
-from handeye.detection.registration import Aligned, Lens
+from handeye.detection.registration import Aligned
 from handeye.types import AprilGrid
 from handeye.types.arrays import FloatArray, IndexArray
 
@@ -29,6 +32,11 @@ _SIDES = np.array([[[1, 0], [0, -1]], [[0, -1], [-1, 0]], [[-1, 0], [0, 1]], [[0
 FEWEST_TAGS = 2
 # Tried until all tags are found; one leaves the ink as it is.
 THINNING_PX = (3, 1, 5)
+
+
+@lru_cache(maxsize=16)
+def _bits(target: AprilGrid) -> Bits:
+    return Bits.of(target, target.points[:, :2].reshape(-1, 4, 2), target.dictionary, target.border_bits)
 
 
 def find(image: Image, target: AprilGrid) -> Detection | NotFound:
@@ -60,7 +68,7 @@ def find(image: Image, target: AprilGrid) -> Detection | NotFound:
     seen = np.where(astray[:, np.newaxis], expected, seen.reshape(-1, 2)).reshape(-1, 4, 2)
     rough = _measured(image, target, seen, None)
     good = np.flatnonzero(np.isfinite(rough[:, 0]))
-    lens = Lens.fitted(plane[good], rough[good]) if len(good) >= 4 else None
+    lens = _core.PlaneMap.fitted(plane[good], rough[good]) if len(good) >= 4 else None
     if lens is None:
         return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
     # Once more: all corners together tell the directions of edges better than a tag does.
@@ -77,10 +85,9 @@ def find(image: Image, target: AprilGrid) -> Detection | NotFound:
 def confirm(image: Image, target: AprilGrid, board: Aligned) -> Detection | None:
     """Return the corners of a grid that was found where it was expected; None unless it is that one."""
     plane = target.points[:, :2]
-    outlines = plane.reshape(-1, 4, 2)
-    places = board.places(outlines)
+    places = board.places(plane.reshape(-1, 4, 2))
     expected = inside(image, places.reshape(-1, 2)).reshape(-1, 4).all(axis=1)
-    read = expected & readable(board, outlines, target.dictionary, target.border_bits)
+    read = expected & _bits(target).readable(board)
     if read.sum() < max(FEWEST_TAGS, LEAST_SHARE * expected.sum()):
         return None
     ids = (4 * np.flatnonzero(read)[:, np.newaxis] + np.arange(4)).ravel()

@@ -116,14 +116,12 @@ def ordered(target: Target, point_ids: ArrayLike, pixels: ArrayLike) -> Detectio
     Where the target has symmetries the picture cannot tell its labelings apart; the one is taken whose x axis
     points furthest to the right in the image, so that views without much roll agree.
     """
-    ids = np.asarray(point_ids, dtype=np.int64)
-    detection = Detection(ids, pixels)
-    best = max(
-        (relabeled(detection, permutation) for permutation in target.symmetries),
-        key=lambda candidate: x_axis(target, candidate)[0],
-    )
-    order = np.argsort(best.point_ids)
-    return Detection(best.point_ids[order], best.pixels[order])
+    detection = Detection(point_ids, pixels)
+    if len(target.symmetries) > 1:
+        named = (relabeled(detection, permutation) for permutation in target.symmetries)
+        detection = max(named, key=lambda candidate: x_axis(target, candidate)[0])
+    order = np.argsort(detection.point_ids)
+    return Detection(detection.point_ids[order], detection.pixels[order])
 
 
 def x_axis(target: Target, detection: Detection) -> FloatArray:

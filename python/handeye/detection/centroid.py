@@ -6,15 +6,18 @@ the others are taken as inside or outside, so that their noise does not count. T
 spot. The sums are done in `handeye._core`.
 """
 
-import numpy as np
-
 from handeye import _core
 from handeye.detection.base import Image
 from handeye.detection.blobs import Spots
 from handeye.types.arrays import FloatArray
 
 
-def area_centroids(image: Image, spots: Spots, gaps_px: FloatArray) -> Spots:
+def gaps(spots: Spots) -> FloatArray:
+    """Return the narrowest free distance (N,) in pixels from the edge of each spot to that of another one."""
+    return _core.free_gaps(spots.centres, spots.shapes)
+
+
+def area_centroids(image: Image, spots: Spots, gaps_px: FloatArray | None = None) -> Spots:
     """Return spots where the grey values have them; NaN where the image's edge cuts one, or without contrast.
 
     Parameters
@@ -24,9 +27,9 @@ def area_centroids(image: Image, spots: Spots, gaps_px: FloatArray) -> Spots:
     spots
         First guesses.
     gaps_px
-        (N,) narrowest free distance from the edge of each to that of the next spot.
+        (N,) narrowest free distance from the edge of each to that of the next spot; None where these spots
+        are all there are.
     """
-    centres, shapes = _core.area_centroids(
-        np.ascontiguousarray(image, dtype=np.uint8), spots.centres, spots.shapes, gaps_px
-    )
+    free = gaps(spots) if gaps_px is None else gaps_px
+    centres, shapes = _core.area_centroids(image, spots.centres, spots.shapes, free)
     return Spots(centres, shapes)

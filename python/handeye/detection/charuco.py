@@ -5,6 +5,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
+from handeye import _core
 from handeye.detection.base import (
     Detection,
     Image,
@@ -17,14 +18,14 @@ from handeye.detection.corner_fit import CornerKind, astray, fit_corners
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.markers import (
     LEAST_SHARE,
+    Bits,
     dictionary,
     disagreement,
     foreign_markers,
     parameters,
-    readable,
     unique,
 )
-from handeye.detection.registration import LEAST_LIKENESS, Aligned, Lens
+from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import Charuco
 from handeye.types.arrays import FloatArray
 
@@ -45,6 +46,11 @@ def _board(target: Charuco) -> tuple[cv2.aruco.CharucoBoard, FloatArray]:
     board.setLegacyPattern(target.legacy_pattern)
     # OpenCV counts from the outer corner.
     return board, np.asarray(board.getObjPoints(), dtype=np.float64)[:, :, :2] - target.square_m
+
+
+@lru_cache(maxsize=16)
+def _bits(target: Charuco) -> Bits:
+    return Bits.of(target, _board(target)[1], target.dictionary, 1)
 
 
 def find(image: Image, target: Charuco) -> Detection | NotFound:
@@ -76,7 +82,7 @@ def find(image: Image, target: Charuco) -> Detection | NotFound:
         numbers, rough = numbers[good], rough[good]
         # Once more: all corners together tell the directions of edges better than a marker does.
         plane = target.points[numbers, :2]
-        lens = Lens.fitted(plane, rough) if len(rough) >= FEWEST_CORNERS else None
+        lens = _core.PlaneMap.fitted(plane, rough) if len(rough) >= FEWEST_CORNERS else None
         if lens is not None:
             rough = _measured(image, target, rough, lens.steps(plane, 0.1 * target.square_m))
         good = np.isfinite(rough).all(axis=1)
@@ -94,7 +100,7 @@ def confirm(image: Image, target: Charuco, board: Aligned) -> Detection | None:
     _, outlines = _board(target)
     markers = board.places(outlines)
     expected = inside(image, markers.reshape(-1, 2)).reshape(-1, 4).all(axis=1)
-    read = expected & readable(board, outlines, target.dictionary, 1)
+    read = expected & _bits(target).readable(board)
     if read.sum() < max(FEWEST_MARKERS, LEAST_SHARE * expected.sum()):
         return None
     plane = target.points[:, :2]

@@ -7,14 +7,15 @@ area centroid of each circle is measured from grey values. The solver predicts a
 import numpy as np
 from numpy.typing import NDArray
 
+from handeye import _core
 from handeye.detection.base import Detection, Image, NotFound, Reason, ordered
 from handeye.detection.beyond import goes_on
 from handeye.detection.blobs import Spots, areas, find_spots
-from handeye.detection.centroid import area_centroids
+from handeye.detection.centroid import area_centroids, gaps
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.lattice import Placement, grow, placements
 from handeye.detection.part import Part
-from handeye.detection.registration import LEAST_LIKENESS, Aligned, Lens
+from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import CircleGrid
 from handeye.types.arrays import FloatArray, IndexArray
 
@@ -83,7 +84,7 @@ def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | Non
 
 def _measure_first(image: Image, expected: Spots, which: int) -> None:
     """Put the shape of a circle of unknown size where it is expected; its neighbours depend on it, too."""
-    spot, gap = expected.take(np.array([which])), _gaps(expected)[[which]]
+    spot, gap = expected.take(np.array([which])), gaps(expected)[[which]]
     spot.shapes[:] *= LARGER**2
     for _ in range(2):
         spot = area_centroids(image, spot, gap)
@@ -98,11 +99,11 @@ def _centroids(image: Image, circles: Spots, plane: FloatArray) -> Spots:
     Of small ones each pixel counts: they are measured once more from where all together put them, so that the
     first guesses do not matter.
     """
-    found = area_centroids(image, circles, _gaps(circles))
+    found = area_centroids(image, circles)
     good = np.flatnonzero(np.isfinite(found.centres[:, 0]))
     if len(good) < FEWEST_TOGETHER or np.median(found.areas[good]) > np.pi * SMALL_PX**2:
         return found
-    lens = Lens.fitted(plane[good], found.centres[good])
+    lens = _core.PlaneMap.fitted(plane[good], found.centres[good])
     if lens is None:
         return found
     # A circle of one metre, then of the size that it has.
@@ -111,7 +112,7 @@ def _centroids(image: Image, circles: Spots, plane: FloatArray) -> Spots:
     usual = float(np.median(sizes))
     sizes = np.where(np.abs(np.log(sizes / usual)) < np.log(AREA_RATIO), usual, sizes)
     again = Spots(outlines.centres, outlines.shapes * sizes[:, np.newaxis, np.newaxis])
-    again = area_centroids(image, again, _gaps(again))
+    again = area_centroids(image, again)
     found.centres[good], found.shapes[good] = again.centres, again.shapes
     return found
 
@@ -208,21 +209,3 @@ def _marked_ratio(target: CircleGrid, chosen: IndexArray, shapes: FloatArray) ->
     away = np.linalg.norm(target.points - target.points[target.marked], axis=1)
     around = chosen[np.argsort(away)[1:6]]
     return float(areas(shapes[[chosen[target.marked]]])[0] / np.median(areas(shapes[around[around >= 0]])))
-
-
-def _gaps(circles: Spots) -> FloatArray:
-    """Return the narrowest free distance (N,) of each circle to another one."""
-    offset = circles.centres[np.newaxis] - circles.centres[:, np.newaxis]
-    distance = np.linalg.norm(offset, axis=2)
-    np.fill_diagonal(distance, np.inf)
-    nearest = np.argsort(distance, axis=1)[:, :4]
-    inverse = np.linalg.inv(circles.shapes)
-    gaps = np.full(len(circles), np.inf)
-    for other in nearest.T:
-        index = np.arange(len(circles))
-        d = distance[index, other]
-        u = offset[index, other] / d[:, np.newaxis]
-        own = 1 / np.sqrt(np.einsum("na,nab,nb->n", u, inverse, u))
-        its = 1 / np.sqrt(np.einsum("na,nab,nb->n", u, inverse[other], u))
-        gaps = np.minimum(gaps, d - own - its)
-    return np.maximum(gaps, 1.0)

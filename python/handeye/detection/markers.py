@@ -1,5 +1,6 @@
 """Square markers of a dictionary: finding them, and whether they lie as the board has them."""
 
+from dataclasses import dataclass
 from functools import cache
 
 import cv2
@@ -8,7 +9,8 @@ from numpy.typing import NDArray
 
 from handeye.detection.base import Image, NotFound, Reason
 from handeye.detection.beyond import correlation
-from handeye.detection.registration import Aligned
+from handeye.detection.registration import Aligned, drawn
+from handeye.types import Target
 from handeye.types.arrays import FloatArray, IndexArray
 
 # Smallest perimeter of a marker, as a share of the longer side of the image.
@@ -64,26 +66,36 @@ def unique(ids: object, corners: object) -> tuple[IndexArray, FloatArray]:
     return numbers[once], places[once]
 
 
-def readable(board: Aligned, outlines: FloatArray, name: str, border_bits: int) -> NDArray[np.bool_]:
-    """Tell which markers (M,) show their numbers where they should be.
+@dataclass(frozen=True, eq=False)
+class Bits:
+    """The bits of the markers of a board.
 
-    Parameters
+    Attributes
     ----------
-    board
-        Where the board seems to be.
-    outlines
-        (M, 4, 2) corners of the markers in the plane of the board, all round.
-    name, border_bits
-        Of the markers.
+    places
+        (M, B, B, 2) where they are in the plane of the board.
+    drawn
+        (M, B, B) what is printed there.
     """
-    bits = dictionary(name).markerSize
-    steps = (border_bits + np.arange(bits) + 0.5) / (bits + 2 * border_bits)
-    first = outlines[:, np.newaxis, np.newaxis, 0]
-    across, down = (outlines[:, np.newaxis, np.newaxis, k] - first for k in (1, 3))
-    places = first + across * steps[:, np.newaxis] + down * steps[:, np.newaxis, np.newaxis]
-    seen = board.seen(places)
-    agreement = correlation(seen, board.drawn(places))
-    return (agreement >= LEAST_AGREEMENT) & (seen.std(axis=(1, 2)) >= LEAST_CONTRAST)
+
+    places: FloatArray
+    drawn: FloatArray
+
+    @classmethod
+    def of(cls, target: Target, outlines: FloatArray, name: str, border_bits: int) -> "Bits":
+        """Return the bits of markers of a dictionary, with corners (M, 4, 2) in the plane, all round."""
+        bits = dictionary(name).markerSize
+        steps = (border_bits + np.arange(bits) + 0.5) / (bits + 2 * border_bits)
+        first = outlines[:, np.newaxis, np.newaxis, 0]
+        across, down = (outlines[:, np.newaxis, np.newaxis, k] - first for k in (1, 3))
+        places = first + across * steps[:, np.newaxis] + down * steps[:, np.newaxis, np.newaxis]
+        return cls(places, drawn(target, places))
+
+    def readable(self, board: Aligned) -> NDArray[np.bool_]:
+        """Tell which markers (M,) show their numbers where they should be."""
+        seen = board.seen(self.places)
+        agreement = correlation(seen, self.drawn)
+        return (agreement >= LEAST_AGREEMENT) & (seen.std(axis=(1, 2)) >= LEAST_CONTRAST)
 
 
 def disagreement(plane: FloatArray, pixels: FloatArray) -> NotFound | None:

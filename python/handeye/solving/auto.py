@@ -36,6 +36,8 @@ FEWEST_DEGREES_OF_FREEDOM = 4.5
 LIKENESS_M, LIKENESS_CHORD = 1.0, 2.0
 # A mirrored pose is looked at where it fits less than this many times worse than the best.
 MIRROR_RATIO = 8.0
+# Hypotheses about the noise that are less likely are left aside.
+LEAST_PROBABILITY = 1e-4
 # Without a covariance: relative focal length, principal point as a share of the width, coefficients.
 DEFAULT_FOCAL_SIGMA = 0.002
 DEFAULT_CENTRE_SIGMA = 0.002
@@ -186,10 +188,11 @@ class AutoEstimator:
         parameters = np.array(measurements.camera.parameters)
         parameters[list(prior.free)] += posterior.camera_delta
         camera = Camera(measurements.camera.lens, parameters, *measurements.camera.size_px)
+        weighed = enumerate(zip(posterior.hypotheses, posterior.joint_levels, strict=True))
         hypotheses = tuple(
-            _hypothesis(posterior, i, mounting, arm, links)
-            for i, (_, _, _, probability) in enumerate(posterior.hypotheses)
-            if probability > 1e-4
+            _hypothesis(given, joint_rad, posterior.information(rank), mounting, arm, links)
+            for rank, (given, (joint_rad, _)) in weighed
+            if given[3] > LEAST_PROBABILITY
         )
         sigma_px = np.sqrt(posterior.variances_px2)
         X, Y = Pose(posterior.x), Pose(posterior.y)
@@ -222,17 +225,20 @@ class AutoEstimator:
 
 
 def _hypothesis(
-    posterior: _core.Posterior, rank: int, mounting: Mounting, arm: JointModel | None, links: LinkModel | None
+    given: tuple[str, float, float, float],
+    joint_rad: float,
+    information: FloatArray,
+    mounting: Mounting,
+    arm: JointModel | None,
+    links: LinkModel | None,
 ) -> Hypothesis:
-    side, translation, rotation, probability = posterior.hypotheses[rank]
-    joint_rad, _ = posterior.joint_levels[rank]
+    side, translation, rotation, probability = given
     deviations: tuple[float, ...] = ()
     if arm is not None and joint_rad > 0:
         translation, rotation = arm.lever_m * joint_rad, arm.turn * joint_rad
         deviations = arm.deviations(joint_rad)
     if links is not None and side == RobotSide.LINKS:
         translation, rotation = links.at_flange(translation, rotation)
-    information = posterior.information(rank)
     return Hypothesis(
         probability, side_of_robot(mounting, side), translation, rotation, information, deviations
     )

@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
+use super::descent::{Poses, Run};
 use crate::closed_form;
 use crate::error::Error;
 use crate::se3::{Se3, hat, nearest_rotation};
@@ -56,10 +57,6 @@ impl WeakPrior {
         right.fixed_rows_mut::<6>(0).copy_from(&pull);
         (information, right)
     }
-
-    fn cost(&self, x: &Se3) -> f64 {
-        ((x.translation - self.x_translation_m) / self.x_translation_sigma_m).norm_squared()
-    }
 }
 
 /// `X` and `Y` found from poses.
@@ -80,11 +77,6 @@ const FIRST_STEPS: usize = 6;
 const LAST_STEPS: usize = 25;
 /// Starts that survive the thinning.
 const SURVIVORS: usize = 6;
-
-struct Run {
-    start: ChainStart,
-    damping: f64,
-}
 
 /// Finds `X` and `Y` with `poses[k] ~ X motions[k] Y`, weighted by the poses' covariances.
 ///
@@ -108,104 +100,27 @@ pub fn start_from_poses(
         .ok_or_else(|| Error::invalid("the covariance of a pose is not positive definite"))?;
     let mut starts = Vec::new();
     if let Some((x, y)) = given {
-        starts.push((x, y, "given"));
+        starts.push(Run::new(x, y, "given"));
     }
     for method in [closed_form::Method::Shah, closed_form::Method::ParkMartin] {
         if let Ok(estimate) = closed_form::solve(method, motions, poses) {
-            starts.push((estimate.x, estimate.y, method.name()));
+            starts.push(Run::new(estimate.x, estimate.y, method.name()));
         }
     }
     for rotation in axis_rotations() {
         let (x, y) = with_rotation(&rotation, motions, poses, prior);
-        starts.push((x, y, "axes"));
+        starts.push(Run::new(x, y, "axes"));
     }
-    let mut runs: Vec<Run> = starts
+    let poses = Poses::new(motions, poses, &weights, prior);
+    poses.descend(&mut starts, FIRST_STEPS);
+    starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    starts.truncate(SURVIVORS);
+    poses.descend(&mut starts, LAST_STEPS);
+    starts
         .into_iter()
-        .map(|(x, y, origin)| Run {
-            start: ChainStart { x, y, cost: cost(&x, &y, motions, poses, &weights, prior), origin },
-            damping: 1e-3,
-        })
-        .collect();
-    iterate(&mut runs, FIRST_STEPS, motions, poses, &weights, prior);
-    runs.sort_by(|a, b| a.start.cost.total_cmp(&b.start.cost));
-    runs.truncate(SURVIVORS);
-    iterate(&mut runs, LAST_STEPS, motions, poses, &weights, prior);
-    runs.into_iter()
-        .map(|run| run.start)
+        .map(|run| ChainStart { x: run.x, y: run.y, cost: run.cost, origin: run.origin })
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
         .ok_or_else(|| Error::numerical("no start"))
-}
-
-fn iterate(
-    runs: &mut [Run],
-    steps: usize,
-    motions: &[Se3],
-    poses: &[Se3],
-    weights: &[Matrix6<f64>],
-    prior: &WeakPrior,
-) {
-    for run in runs {
-        for _ in 0..steps {
-            let before = run.start.cost;
-            step(run, motions, poses, weights, prior);
-            if run.start.cost < before && before - run.start.cost < 1e-9 * before {
-                break;
-            }
-        }
-    }
-}
-
-fn step(run: &mut Run, motions: &[Se3], poses: &[Se3], weights: &[Matrix6<f64>], prior: &WeakPrior) {
-    let (x, y) = (run.start.x, run.start.y);
-    let (mut h, mut right) = prior.normal(&x);
-    for ((motion, pose), weight) in motions.iter().zip(poses).zip(weights) {
-        let forward = x * *motion;
-        let error = (forward * y * pose.inverse()).log();
-        let to_y = forward.adjoint();
-        let (wy, we) = (weight * to_y, weight * error);
-        let mut block = h.fixed_view_mut::<6, 6>(0, 0);
-        block += weight;
-        let mut block = h.fixed_view_mut::<6, 6>(0, 6);
-        block += wy;
-        let mut block = h.fixed_view_mut::<6, 6>(6, 0);
-        block += wy.transpose();
-        let mut block = h.fixed_view_mut::<6, 6>(6, 6);
-        block += to_y.transpose() * wy;
-        let mut rows = right.fixed_rows_mut::<6>(0);
-        rows -= we;
-        let mut rows = right.fixed_rows_mut::<6>(6);
-        rows -= to_y.transpose() * we;
-    }
-    for i in 0..12 {
-        h[(i, i)] *= 1.0 + run.damping;
-    }
-    let accepted = h.cholesky().and_then(|factor| {
-        let delta = factor.solve(&right);
-        let x = Se3::exp(&delta.fixed_rows::<6>(0).into_owned()) * x;
-        let y = Se3::exp(&delta.fixed_rows::<6>(6).into_owned()) * y;
-        let cost = cost(&x, &y, motions, poses, weights, prior);
-        (cost <= run.start.cost).then_some((x, y, cost))
-    });
-    if let Some((x, y, cost)) = accepted {
-        run.start = ChainStart { x, y, cost, origin: run.start.origin };
-        run.damping = (run.damping * 0.1).max(1e-12);
-    } else {
-        run.damping = (run.damping * 10.0).min(1e6);
-    }
-}
-
-fn cost(
-    x: &Se3,
-    y: &Se3,
-    motions: &[Se3],
-    poses: &[Se3],
-    weights: &[Matrix6<f64>],
-    prior: &WeakPrior,
-) -> f64 {
-    motions.iter().zip(poses).zip(weights).fold(prior.cost(x), |sum, ((motion, pose), weight)| {
-        let error: Vector6<f64> = (*x * *motion * *y * pose.inverse()).log();
-        sum + error.dot(&(weight * error))
-    })
 }
 
 /// `Y` as the mean rotation of what the views say, and both translations by linear least squares.

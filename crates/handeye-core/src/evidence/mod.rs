@@ -7,11 +7,15 @@
 
 mod chain;
 mod compressed;
+mod descent;
 mod hypotheses;
 mod joints;
 mod links;
 mod posterior;
 mod smooth;
+mod systems;
+mod twists;
+mod view_sets;
 mod weigh;
 mod weigh_links;
 
@@ -22,6 +26,7 @@ pub use joints::JointErrors;
 pub use links::LinkErrors;
 pub use posterior::{EvidenceOptions, Posterior, estimate};
 pub use smooth::SmoothError;
+pub use view_sets::{LinearisedView, NoiseLevel, SetFit, ViewSets};
 
 #[cfg(test)]
 mod tests;

@@ -22,6 +22,7 @@ pub(crate) use marginal::marginalised;
 pub use model::{ChainPrior, KinematicParameters, Model, PixelParameters, RobotNoise, Side};
 pub use problem::{MIN_VIEWS, Problem};
 pub use report::{Ending, Solution, ViewReport};
+pub(crate) use side_by_side::through_chain;
 pub use solver::{Method, Options, Start, solve};
 
 #[cfg(test)]

@@ -1,8 +1,13 @@
 //! Places measured in grey values: corners where edges cross, and centroids of spots.
 
+pub mod alignment;
 pub mod corner;
 mod corner_equations;
 mod corner_window;
+mod correlation;
+pub mod plane_map;
+pub mod printed;
+mod raster;
 pub mod spot;
 mod spot_sums;
 

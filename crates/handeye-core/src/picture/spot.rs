@@ -40,6 +40,28 @@ pub fn area_centroid<T: Copy + Into<f32>>(picture: &Picture<'_, T>, guess: &Spot
     (0..PASSES).try_fold(*guess, |spot, _| measured(picture, &spot, gap, &mut ring))
 }
 
+/// The narrowest free distance in pixels from the edge of each spot to that of another one, at least one.
+pub fn free_gaps(spots: &[Spot]) -> Vec<f64> {
+    let inverses: Vec<_> = spots.iter().map(|s| s.shape.try_inverse().unwrap_or_default()).collect();
+    let longest: Vec<_> = spots.iter().map(|s| half_axes(&s.shape).map_or(0.0, |axes| axes[1])).collect();
+    let to_edge = |inverse: &Matrix2<f64>, along: &Vector2<f64>| 1.0 / along.dot(&(inverse * along)).sqrt();
+    (0..spots.len())
+        .map(|i| {
+            let mut gap = f64::INFINITY;
+            for k in (0..spots.len()).filter(|k| *k != i) {
+                let offset = spots[k].centre - spots[i].centre;
+                let distance = offset.norm();
+                if distance - longest[i] - longest[k] < gap {
+                    let along = offset / distance;
+                    let between = distance - to_edge(&inverses[i], &along) - to_edge(&inverses[k], &along);
+                    gap = gap.min(if distance > 0.0 { between } else { 0.0 });
+                }
+            }
+            gap.max(1.0)
+        })
+        .collect()
+}
+
 fn measured<T: Copy + Into<f32>>(
     picture: &Picture<'_, T>,
     spot: &Spot,
@@ -197,6 +219,22 @@ mod tests {
                 assert!(error < 6e-3, "{centre:?} {light}: {error}");
             }
         }
+    }
+
+    #[test]
+    fn gaps_are_from_edge_to_edge() {
+        let spot = |x: f64, y: f64, axes: [f64; 2]| Spot {
+            centre: Vector2::new(x, y),
+            shape: Matrix2::from_diagonal(&Vector2::from(axes.map(|a| a * a))),
+        };
+        let spots = [spot(0.0, 0.0, [4.0, 2.0]), spot(10.0, 0.0, [3.0, 5.0]), spot(0.0, 30.0, [1.0, 9.0])];
+        let gaps = free_gaps(&spots);
+        for (gap, expected) in gaps.iter().zip([3.0, 3.0, 19.0]) {
+            assert!((gap - expected).abs() < 1.0, "{gaps:?}");
+        }
+        assert!((gaps[0] - 3.0).abs() < 1e-12);
+        assert_eq!(free_gaps(&spots[..1]), [f64::INFINITY]);
+        assert_eq!(free_gaps(&[spots[0], spots[0]]), [1.0, 1.0]);
     }
 
     #[test]

@@ -59,11 +59,25 @@ def find_consensus(sightings: Sightings, candidates: FloatArray) -> Consensus:
     X, Y = _seeds(sightings, candidates)
     away, labels = _nearest(sightings, candidates, X, Y, distance)
     scores = _score(away, distance)
-    refined = [
-        _concentrate(sightings, candidates, Consensus(X[n], Y[n], labels[n], away[n], float(scores[n])))
-        for n in np.argsort(scores)[:REFINED_SEEDS].tolist()
-    ]
-    return min(refined, key=lambda consensus: consensus.score)
+    few = np.argsort(scores)[:REFINED_SEEDS]
+    seeds = _Seeds(X[few], Y[few], labels[few], away[few], scores[few])
+    _concentrate(sightings, candidates, seeds)
+    return seeds.best()
+
+
+@dataclass
+class _Seeds:
+    """Some `Consensus`, one per row."""
+
+    X: FloatArray
+    Y: FloatArray
+    labels: IndexArray
+    away: FloatArray
+    scores: FloatArray
+
+    def best(self) -> Consensus:
+        n = int(np.argmin(self.scores))
+        return Consensus(self.X[n], self.Y[n], self.labels[n], self.away[n], float(self.scores[n]))
 
 
 def _seeds(sightings: Sightings, candidates: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -193,40 +207,52 @@ def _score(away: FloatArray, distance_m: float) -> FloatArray:
     return np.mean(np.log(np.square(away / distance_m) + FLOOR_SHARE**2), axis=-1) / 2
 
 
-def _concentrate(sightings: Sightings, candidates: FloatArray, seed: Consensus) -> Consensus:
-    """Refit to the views that agree best, until the score no longer falls."""
-    distance, best = sightings.distance_m, seed
-    count = len(sightings)
+def _concentrate(sightings: Sightings, candidates: FloatArray, seeds: _Seeds) -> None:
+    """Refit each seed to the views that agree with it best, until its score no longer falls."""
+    distance, count = sightings.distance_m, len(sightings)
     core = max(min(count, 4), int(np.ceil(CORE_SHARE * count)))
+    going = np.arange(len(seeds.scores))
     for _ in range(CONCENTRATIONS):
-        chosen = np.argsort(best.distances_m)[:core]
-        shown = candidates[np.arange(count), best.labels]
-        X, Y = refine(best.X, best.Y, sightings.motions[chosen], shown[chosen], distance)
-        away, labels = _nearest(sightings, candidates, X[np.newaxis], Y[np.newaxis], distance)
-        score = float(_score(away[0], distance))
-        if not score < best.score - 1e-6:
+        chosen = np.argsort(seeds.away[going], axis=1)[:, :core]
+        shown = candidates[chosen, np.take_along_axis(seeds.labels[going], chosen, axis=1)]
+        X, Y = refine(seeds.X[going], seeds.Y[going], sightings.motions[chosen], shown, distance)
+        away, labels = _nearest(sightings, candidates, X, Y, distance)
+        scores = _score(away, distance)
+        better = scores < seeds.scores[going] - 1e-6
+        going = going[better]
+        if not len(going):
             break
-        best = Consensus(X, Y, labels[0], away[0], score)
-    return best
+        seeds.X[going], seeds.Y[going] = X[better], Y[better]
+        seeds.labels[going], seeds.away[going], seeds.scores[going] = (
+            labels[better],
+            away[better],
+            scores[better],
+        )
 
 
 def refine(
     X: FloatArray, Y: FloatArray, motions: FloatArray, poses: FloatArray, lever_m: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Least squares of the twists between chain and poses, translations in units of the lever."""
+    """Least squares of the twists between chains and poses, translations in units of the lever.
+
+    X and Y are (N, 4, 4), motions and poses (N, V, 4, 4).
+    """
     weight = np.array([1.0] * 3 + [lever_m] * 3)
-    chain = np.stack([X, Y])
+    N, V = motions.shape[:2]
+    back, x, y = inverted(poses), X, Y
     for _ in range(GAUSS_NEWTON_STEPS):
-        forward = chain[0] @ motions
-        error = twists(forward @ chain[1] @ inverted(poses))
-        rows = np.concatenate(
-            [np.broadcast_to(np.eye(6), (len(forward), 6, 6)), _core.se3_adjoint(forward)], axis=2
-        )
-        rows = (rows * weight[:, np.newaxis]).reshape(-1, 12)
-        normal = rows.T @ rows
-        damping = 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(12)
-        step = -np.linalg.solve(normal + damping, rows.T @ (error * weight).reshape(-1))
-        chain = _core.se3_exp(step.reshape(2, 6)) @ chain
+        forward = x[:, np.newaxis] @ motions
+        error = twists(forward @ y[:, np.newaxis] @ back)
+        to_y = _core.se3_adjoint(forward.reshape(-1, 4, 4)).reshape(N, V, 6, 6)
+        rows = np.concatenate([np.broadcast_to(np.eye(6), to_y.shape), to_y], axis=3)
+        rows = (rows * weight[:, np.newaxis]).reshape(N, 6 * V, 12)
+        transposed = np.swapaxes(rows, 1, 2)
+        normal = transposed @ rows
+        diagonal = np.arange(12)
+        normal[:, diagonal, diagonal] = normal[:, diagonal, diagonal] * (1 + 1e-9) + 1e-12
+        right = transposed @ (error * weight).reshape(N, 6 * V, 1)
+        step = -np.asarray(np.linalg.solve(normal, right), dtype=np.float64)[..., 0]
+        x, y = _core.se3_exp(step[:, :6]) @ x, _core.se3_exp(step[:, 6:]) @ y
         if np.abs(step).max() < SMALLEST_STEP:
             break
-    return chain[0], chain[1]
+    return x, y

@@ -109,7 +109,9 @@ def find_pairing(sightings: Sightings) -> IndexArray | None:
             paired = np.flatnonzero(pairing >= 0)
             if len(paired) < 3:
                 break
-            x, y = refine(x, y, sightings.motions[pairing[paired]], sightings.poses[paired], lever)
+            motions, poses = sightings.motions[pairing[paired]], sightings.poses[paired]
+            refined = refine(x[np.newaxis], y[np.newaxis], motions[np.newaxis], poses[np.newaxis], lever)
+            x, y = refined[0][0], refined[1][0]
             chain = x @ sightings.motions @ y
             here = distances(chain[np.newaxis], sightings.poses[:, np.newaxis], sightings.centre_m, lever)
             pairing = _mutual(here, SAME_PLACE * lever)

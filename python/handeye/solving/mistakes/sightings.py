@@ -6,6 +6,7 @@ anew, scales.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -91,7 +92,7 @@ class Sightings:
     def __len__(self) -> int:
         return len(self.motions)
 
-    @property
+    @cached_property
     def distance_m(self) -> float:
         """Median distance from the camera to the centre of the target."""
         return float(np.median(np.linalg.norm(centres(self.poses, self.centre_m), axis=1)))

@@ -60,6 +60,10 @@ class Fit:
         weights = np.exp(self.log_evidence_each - self.log_evidence_each.max())
         return weights / weights.sum()
 
+    def select(self, chosen: BoolArray) -> "Fit":
+        """Return it with some of the hypotheses."""
+        return Fit(self.members, self.inverse[chosen], self.theta[chosen], self.log_evidence_each[chosen])
+
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
@@ -95,15 +99,20 @@ class Weighing:
             [np.broadcast_to(np.eye(6), (count, 6, 6)), to_y, sightings.sensitivities], axis=2
         )
         self._deviation = twists(forward @ Y @ inverted(sightings.poses))
-        self._covariance = self._noise_covariances(to_y)
-        augmented = np.concatenate([self._rows, self._deviation[:, :, np.newaxis]], axis=2)
-        self._precision = np.linalg.inv(self._covariance)
-        self._gram = np.swapaxes(augmented, 1, 2) @ (self._precision @ augmented)
-        self._log_determinant = np.linalg.slogdet(self._covariance)[1]
-        self._prior = np.zeros((12 + free, 12 + free))
-        self._prior[np.arange(12), np.arange(12)] = WEAK_SIGMA**-2.0
-        self._prior[12:, 12:] = sightings.camera_information
-        self._prior_right = np.concatenate([np.zeros(12), sightings.camera_gradient])
+        # An error of the robot as a twist of a view, where it acts on the left of A, and on the right.
+        self._from_robot = (np.broadcast_to(_core.se3_adjoint(X[np.newaxis]), to_y.shape), to_y)
+        prior = np.zeros((12 + free, 12 + free))
+        prior[np.arange(12), np.arange(12)] = WEAK_SIGMA**-2.0
+        prior[12:, 12:] = sightings.camera_information
+        self._sets = _core.ViewSets(
+            self._deviation,
+            self._rows,
+            sightings.covariances,
+            *self._from_robot,
+            prior,
+            np.concatenate([np.zeros(12), sightings.camera_gradient]),
+        )
+        self._fits: dict[bytes, Fit] = {}
 
     def narrowed(self, fits: Sequence[Fit]) -> "Weighing":
         """Return the same with only the levels that these fits, or one between them, could call for."""
@@ -113,55 +122,29 @@ class Weighing:
             chosen &= (level >= level[weights].min() / 1.01) & (level <= level[weights].max() * 1.01)
         narrow = copy(self)
         narrow.grid = self.grid.select(chosen)
-        narrow._covariance = self._covariance[chosen]  # noqa: SLF001 - of this class
-        narrow._precision = self._precision[chosen]  # noqa: SLF001
-        narrow._gram = self._gram[chosen]  # noqa: SLF001
-        narrow._log_determinant = self._log_determinant[chosen]  # noqa: SLF001
+        narrow._fits = {which: fit.select(chosen) for which, fit in self._fits.items()}  # noqa: SLF001 - of this class
         return narrow
-
-    def _noise_covariances(self, to_y: FloatArray) -> FloatArray:
-        grid = self.grid
-        sigma = np.repeat(np.stack([grid.translation_m, grid.rotation_rad], axis=1), 3, axis=1)
-        left = np.broadcast_to(_core.se3_adjoint(self.X[np.newaxis]), to_y.shape)
-        side = np.where(grid.left[:, np.newaxis, np.newaxis, np.newaxis], left, to_y)
-        root = side * sigma[:, np.newaxis, np.newaxis, :]
-        return self.sightings.covariances + root @ np.swapaxes(root, -1, -2)
 
     def fit(self, members: BoolArray) -> Fit:
         """Weigh the hypotheses by a set of views."""
-        total = self._gram[:, members].sum(axis=1)
-        n = len(self._prior)
-        information = total[:, :n, :n] + self._prior
-        right = self._prior_right - total[:, :n, n]
-        # Scaled to a unit diagonal: metres, radians and pixels differ by many orders of magnitude.
-        scale: FloatArray = 1 / np.sqrt(np.diagonal(information, axis1=1, axis2=2))
-        both = scale[:, :, np.newaxis] * scale[:, np.newaxis, :]
-        inverse = np.asarray(np.linalg.inv(information * both), dtype=np.float64) * both
-        theta = np.einsum("hij,hj->hi", inverse, right)
-        # The squares summed one by one: what the normal equations leave of them is rounding where views are
-        # far off.
-        left = self._deviation[members] + np.einsum("kin,hn->hki", self._rows[members], theta)
-        squares = np.sum(left * (self._precision[:, members] @ left[..., np.newaxis])[..., 0], axis=(1, 2))
-        belief = np.einsum("hi,ij,hj->h", theta, self._prior, theta) - 2 * theta @ self._prior_right
-        log_likelihood = -0.5 * (
-            self._log_determinant[:, members].sum(axis=1)
-            + 6 * int(members.sum()) * LOG_2PI
-            + squares
-            + belief
-            + np.linalg.slogdet(information)[1]
-            - np.linalg.slogdet(self._prior)[1]
-        )
-        return Fit(members, inverse, theta, self.grid.log_prior + log_likelihood)
+        which = members.tobytes()
+        if which not in self._fits:
+            grid = self.grid
+            inverse, theta, log_likelihood = self._sets.fit(
+                grid.left, grid.translation_m, grid.rotation_rad, np.flatnonzero(members)
+            )
+            self._fits[which] = Fit(members, inverse, theta, grid.log_prior + log_likelihood)
+        return self._fits[which]
 
     def predict(self, fit: Fit) -> Prediction:
         """Return what a set says of every view: of a member what the other members say."""
-        rows, n = self._rows, len(self._prior)
+        rows, noise = self._rows, self._noise_covariances()
         spread = rows[np.newaxis] @ fit.inverse[:, np.newaxis] @ np.swapaxes(rows, 1, 2)[np.newaxis]
-        mean = self._deviation + np.einsum("kin,hn->hki", rows[:, :, :n], fit.theta)
-        covariance = self._covariance + spread
+        mean = self._deviation + np.einsum("kin,hn->hki", rows, fit.theta)
+        covariance = noise + spread
         # Of a member the fit has seen: take it out again (Cook and Weisberg 1982, section 2.2).
         inside = np.flatnonzero(fit.members)
-        own = self._covariance[:, inside]
+        own = noise[:, inside]
         remaining = own - spread[:, inside]  # (I - M) Sigma
         taken_out = own @ np.linalg.solve(remaining, np.eye(6))
         covariance[:, inside] = taken_out @ own
@@ -184,6 +167,15 @@ class Weighing:
             deviation=np.einsum("hk,hki->ki", weights, mean),
             covariance=np.einsum("hk,hkij->kij", weights, covariance),
         )
+
+    def _noise_covariances(self) -> FloatArray:
+        """(H, K, 6, 6) of the twists: noise of the images and of the robot."""
+        grid = self.grid
+        sigma = np.repeat(np.stack([grid.translation_m, grid.rotation_rad], axis=1), 3, axis=1)
+        left, right = self._from_robot
+        root = np.where(grid.left[:, np.newaxis, np.newaxis, np.newaxis], left, right)
+        root = root * sigma[:, np.newaxis, np.newaxis, :]
+        return self.sightings.covariances + root @ np.swapaxes(root, -1, -2)
 
     def estimate(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
         """Return X and Y (4, 4) after the step that a fit asks for."""

@@ -18,6 +18,7 @@ use self::look::{Look, Optics, Sight};
 pub(super) use self::measurements::Measurements;
 use self::measurements::Row;
 pub(super) use self::normal::Desk;
+pub(crate) use self::normal::through_chain;
 use self::normal::{Correct, Errors, Noise, Normal, correction, lane, set_lane};
 use self::step::{Equations, Step, Vector12};
 use super::engine::{Engine, Proposal, judge};

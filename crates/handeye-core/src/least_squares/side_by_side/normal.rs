@@ -93,19 +93,22 @@ impl Kernel for Normal<'_> {
     }
 }
 
-/// Adds `B' M B` and `B' g` with `B = [I, C]`, `C = [R, [t]R; 0, R]`, by blocks of three:
+/// Blocks of `B' M B` and `B' g` with `B = [I, C]` beside `M` and `g` themselves.
+pub(crate) struct ThroughChain<V> {
+    /// `M C`.
+    pub xy: [[V; 6]; 6],
+    /// `C' M C`, upper triangle.
+    pub yy: [V; UPPER],
+    /// `C' g`.
+    pub y: [V; 6],
+}
+
+/// With `C = [R, [t]R; 0, R]` of the entries `c`, by blocks of three:
 /// with `M = [M1, M2; M2', M3]`, `M C = [M1 R, (M1 [t] + M2) R; M2' R, (M2' [t] + M3) R]`.
 #[inline(always)]
-fn add<S: Simd>(
-    simd: S,
-    desk: &mut Desk,
-    first: bool,
-    m: &[S::Vector; UPPER],
-    g: &[S::Vector; 6],
-    c: &[S::Vector; 12],
-) {
+pub(crate) fn through_chain<V: Vector>(m: &[V; UPPER], g: &[V; 6], c: &[V; 12]) -> ThroughChain<V> {
     // M [I, [t]; 0, I], then times the rotation.
-    let mut product = [[m[0]; 6]; 6];
+    let mut xy = [[m[0]; 6]; 6];
     for i in 0..6 {
         let mut shifted = [m[0]; 6];
         for j in 0..3 {
@@ -116,23 +119,20 @@ fn add<S: Simd>(
         }
         for j in 0..3 {
             let (p, q, r) = (c[j], c[3 + j], c[6 + j]);
-            product[i][j] = shifted[0].mul_add(p, shifted[1].mul_add(q, shifted[2] * r));
-            product[i][3 + j] = shifted[3].mul_add(p, shifted[4].mul_add(q, shifted[5] * r));
+            xy[i][j] = shifted[0].mul_add(p, shifted[1].mul_add(q, shifted[2] * r));
+            xy[i][3 + j] = shifted[3].mul_add(p, shifted[4].mul_add(q, shifted[5] * r));
         }
     }
-    put(simd, &mut desk.xx, first, m);
-    for (rows, product) in desk.xy.chunks_exact_mut(6).zip(&product) {
-        put(simd, rows, first, product);
-    }
     // [I, 0; [t]', I] M C: the lower rows and [t]' times the upper ones.
+    let mut product = xy;
     for i in 0..3 {
         let (a, b) = ((i + 1) % 3, (i + 2) % 3);
         for j in 3..6 {
-            let first = c[9 + b].mul_add(product[a][j], product[3 + i][j]);
-            product[3 + i][j] = c[9 + a].neg_mul_add(product[b][j], first);
+            let first = c[9 + b].mul_add(xy[a][j], xy[3 + i][j]);
+            product[3 + i][j] = c[9 + a].neg_mul_add(xy[b][j], first);
         }
     }
-    let turned = |column: &[S::Vector; 3], i: usize| {
+    let turned = |column: &[V; 3], i: usize| {
         c[i].mul_add(column[0], c[3 + i].mul_add(column[1], c[6 + i] * column[2]))
     };
     let mut yy = *m;
@@ -156,9 +156,27 @@ fn add<S: Simd>(
         y[i] = turned(&[g[0], g[1], g[2]], i);
         y[3 + i] = turned(&low, i);
     }
-    put(simd, &mut desk.yy, first, &yy);
+    ThroughChain { xy, yy, y }
+}
+
+/// Adds the quadratic of a view to the sums.
+#[inline(always)]
+fn add<S: Simd>(
+    simd: S,
+    desk: &mut Desk,
+    first: bool,
+    m: &[S::Vector; UPPER],
+    g: &[S::Vector; 6],
+    c: &[S::Vector; 12],
+) {
+    let through = through_chain(m, g, c);
+    put(simd, &mut desk.xx, first, m);
+    for (rows, product) in desk.xy.chunks_exact_mut(6).zip(&through.xy) {
+        put(simd, rows, first, product);
+    }
+    put(simd, &mut desk.yy, first, &through.yy);
     put(simd, &mut desk.x, first, g);
-    put(simd, &mut desk.y, first, &y);
+    put(simd, &mut desk.y, first, &through.y);
 }
 
 /// Adds to sums; to nothing at the `first`.
