@@ -58,7 +58,7 @@ pub struct Posterior {
     pub link_twists: DVector<f64>,
     /// Probability of each hypothesis.
     pub weights: Vec<f64>,
-    /// Information of `[xi_x, xi_y, c, joint offsets]` under each hypothesis.
+    /// Information of `[xi_x, xi_y, c, joint offsets]` under each hypothesis that is worth it, else of no rows.
     pub informations: Vec<DMatrix<f64>>,
     /// Covariance of the parameters: mean of the hypotheses' and the spread between their answers.
     pub covariance: DMatrix<f64>,
@@ -76,6 +76,7 @@ const NEGLIGIBLE: f64 = 1e-6;
 const HOPELESS: f64 = 50.0;
 
 struct Linear {
+    /// Of no rows where it is of no use.
     information: DMatrix<f64>,
     theta: DVector<f64>,
     /// By how much the joints are most likely displaced, where that is the hypothesis.
@@ -140,7 +141,7 @@ pub fn estimate(
         }
         let prepared = prepare(views, variances_px2, &x, &y, options.joints.as_ref());
         let camera = camera_terms(views, variances_px2, &options.camera_prior);
-        let evaluated = weigh(&prepared, hypotheses, &chosen, &x, options, &camera);
+        let evaluated = weigh(&prepared, hypotheses, &chosen, &x, options, &camera, last);
         let best = evaluated.iter().map(|e| e.2).fold(f64::NEG_INFINITY, f64::max);
         if evaluated.is_empty() || !best.is_finite() {
             return Err(Error::numerical("no noise level explains these views"));
@@ -228,10 +229,10 @@ fn finish(
     for (i, linear, log) in evaluated {
         let weight = (log - best).exp() / total;
         weights[*i] = weight;
-        informations[*i] = linear.information.clone();
         if weight < NEGLIGIBLE {
             continue;
         }
+        informations[*i] = linear.information.clone();
         let Some(factor) = Factor::new(&linear.information) else { continue };
         let inverse = factor.inverse();
         let block = inverse.fixed_view::<6, 6>(0, 0).into_owned();
@@ -307,7 +308,8 @@ fn camera_terms(
     (information, gradient)
 }
 
-/// Each of the chosen hypotheses that has a likelihood, with the logarithm of its probability.
+/// Each of the chosen hypotheses that has a likelihood, with the logarithm of its probability; the informations of
+/// those that are not negligible only where they are `wanted`.
 fn weigh(
     views: &[View],
     hypotheses: &[Hypothesis],
@@ -315,6 +317,7 @@ fn weigh(
     x: &Se3,
     options: &EvidenceOptions,
     camera: &(DMatrix<f64>, DVector<f64>),
+    wanted: bool,
 ) -> Vec<(usize, Linear, f64)> {
     let unit = VectorUnit::widest();
     let mut equations = Equations::new(12 + camera.1.len() + options.offset_count(), chosen.len());
@@ -348,16 +351,22 @@ fn weigh(
         .collect();
     add_beliefs(hypotheses, chosen, x, options, camera, (&mut equations, &mut constants));
     equations.solve(unit);
-    let weighed = chosen.iter().enumerate().map(|(place, i)| {
+    let mut weighed: Vec<(usize, usize, f64)> = Vec::with_capacity(chosen.len());
+    for (place, i) in chosen.iter().enumerate() {
         let log = hypotheses[*i].log_prior - 0.5 * (constants[place] + equations.value(place));
-        (place, *i, log)
-    });
+        if log.is_finite() {
+            weighed.push((place, *i, log));
+        }
+    }
+    let best = weighed.iter().map(|w| w.2).fold(f64::NEG_INFINITY, f64::max);
     weighed
-        .filter(|(_, _, log)| log.is_finite())
+        .into_iter()
         .map(|(place, i, log)| {
             let theta = DVector::from_iterator(equations.size(), equations.theta(place));
             let link_twists = links[place].as_ref().map(|sums| sums.displacements(&theta));
-            (i, Linear { information: equations.information(place), theta, link_twists }, log)
+            let useful = wanted && (log - best).exp() >= NEGLIGIBLE;
+            let information = if useful { equations.information(place) } else { DMatrix::zeros(0, 0) };
+            (i, Linear { information, theta, link_twists }, log)
         })
         .collect()
 }
