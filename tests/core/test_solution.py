@@ -60,7 +60,9 @@ def test_arrays_of_any_layout_and_type_are_taken() -> None:
     expected = given.problem().squared_error(given.X, given.Y)
     wide = np.zeros((4, 8))
     wide[:, ::2] = given.X
-    for X in (np.asfortranarray(given.X), wide[:, ::2], given.X.tolist()):
+    packed = np.zeros(1, dtype=[("flag", "u1"), ("pose", "f8", (4, 4))])
+    packed["pose"] = given.X
+    for X in (np.asfortranarray(given.X), wide[:, ::2], given.X.tolist(), packed["pose"][0]):
         assert given.problem().squared_error(X, given.Y) == expected
     single = given.problem().squared_error(given.X.astype(np.float32), given.Y)
     assert single == pytest.approx(expected, rel=1e-2)

@@ -24,7 +24,12 @@ impl<'py> FromPyObject<'_, 'py> for Array<'py> {
 
     fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         if let Ok(array) = object.cast::<PyArrayDyn<f64>>() {
-            return Ok(Self(array.to_owned()));
+            // Out of a packed record, a number may begin at any byte.
+            return Ok(Self(if array.data().is_aligned() {
+                array.to_owned()
+            } else {
+                array.call_method0("copy")?.cast_into()?
+            }));
         }
         let converted: PyArrayLikeDyn<'py, f64, AllowTypeChange> = object.extract()?;
         Ok(Self(converted.as_any().cast::<PyArrayDyn<f64>>()?.clone()))
