@@ -4,7 +4,7 @@
 //! `[A w, B w, -s w, -(y s + B), A + x s, B x - A y]`, `s = x A + y B`.
 
 use super::block::{BLOCK, Block};
-use super::target::{Patch, Target};
+use super::target::{Target, Way, advance};
 use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
 use crate::lanes::{UPPER, Window, bend, load, store, upper};
 use crate::simd::{Kernel, Simd, Vector};
@@ -47,36 +47,37 @@ fn sum<S: Simd, const RATIONAL: bool, const PRISM: bool>(
     let one = simd.splat(1.0);
     let mut sums = [zero; UPPER];
     let mut seen = zero;
-    for (line_y, line_z, line_x) in target.patches.iter().flat_map(Patch::lines) {
-        let (line_y, line_z) = (simd.splat(line_y), simd.splat(line_z));
-        let start_x = pose[1].mul_add(line_y, pose[2].mul_add(line_z, pose[9]));
-        let start_y = pose[4].mul_add(line_y, pose[5].mul_add(line_z, pose[10]));
-        let start_z = pose[7].mul_add(line_y, pose[8].mul_add(line_z, pose[11]));
-        for along in line_x {
-            let along = simd.splat(along);
-            let depth = pose[6].mul_add(along, start_z);
-            let w = one / depth;
-            let x = pose[0].mul_add(along, start_x) * w;
-            let y = pose[3].mul_add(along, start_y) * w;
-            let bent = bend::<S, RATIONAL, PRISM>(simd, parameters, x, y);
-            let in_sight = bent.in_sight(simd, window) & depth.greater(simd.splat(MIN_DEPTH_M));
-            seen = seen + one.keep(in_sight);
-            let (w, x, y) = (w.keep(in_sight), x.keep(in_sight), y.keep(in_sight));
-            let aspect = simd.splat(parameters[1] / parameters[0]);
-            let rows = [
-                (bent.along_x.keep(in_sight), bent.cross_x.keep(in_sight)),
-                ((bent.cross_y * aspect).keep(in_sight), (bent.along_y * aspect).keep(in_sight)),
-            ];
-            for (a, b) in rows {
-                let s = a.mul_add(x, b * y);
-                // Third and fourth entry with the opposite sign, put right at the end.
-                let row = [a * w, b * w, s * w, y.mul_add(s, b), x.mul_add(s, a), b.mul_add(x, -(a * y))];
-                for i in 0..6 {
-                    for j in i..6 {
-                        sums[upper(i, j)] = row[i].mul_add(row[j], sums[upper(i, j)]);
+    for patch in &target.patches {
+        let way = Way::new(simd, patch, pose);
+        let mut line = way.first;
+        for _ in 0..patch.counts[1] {
+            let mut point = line;
+            for _ in 0..patch.counts[0] {
+                let depth = point[2];
+                let w = one / depth;
+                let (x, y) = (point[0] * w, point[1] * w);
+                let bent = bend::<S, RATIONAL, PRISM>(simd, parameters, x, y);
+                let in_sight = bent.in_sight(simd, window) & depth.greater(simd.splat(MIN_DEPTH_M));
+                seen = seen + one.keep(in_sight);
+                let (w, x, y) = (w.keep(in_sight), x.keep(in_sight), y.keep(in_sight));
+                let aspect = simd.splat(parameters[1] / parameters[0]);
+                let rows = [
+                    (bent.along_x.keep(in_sight), bent.cross_x.keep(in_sight)),
+                    ((bent.cross_y * aspect).keep(in_sight), (bent.along_y * aspect).keep(in_sight)),
+                ];
+                for (a, b) in rows {
+                    let s = a.mul_add(x, b * y);
+                    // Third and fourth entry with the opposite sign, put right at the end.
+                    let row = [a * w, b * w, s * w, y.mul_add(s, b), x.mul_add(s, a), b.mul_add(x, -(a * y))];
+                    for i in 0..6 {
+                        for j in i..6 {
+                            sums[upper(i, j)] = row[i].mul_add(row[j], sums[upper(i, j)]);
+                        }
                     }
                 }
+                advance(&mut point, &way.next);
             }
+            advance(&mut line, &way.next_line);
         }
     }
     for i in [2, 3] {

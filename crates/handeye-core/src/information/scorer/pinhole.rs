@@ -2,7 +2,7 @@
 
 use super::block::{BLOCK, Block};
 use super::forms::packed;
-use super::target::Target;
+use super::target::{Target, Way, advance};
 use super::wide_points::Column;
 use crate::camera::MIN_DEPTH_M;
 use crate::lanes::{PlaneMoments, Window, load, store, upper};
@@ -141,15 +141,8 @@ fn sum<S: Simd, const PARTLY: bool>(
     let mut moments = PlaneMoments::new(simd);
     let mut seen = simd.splat(0.0);
     for patch in &target.patches {
-        let mut line = [one; 3];
-        let (mut next, mut next_line) = (line, line);
-        for row in 0..3 {
-            let [x, y, z] = [pose[3 * row], pose[3 * row + 1], pose[3 * row + 2]];
-            let start = z.mul_add(simd.splat(patch.first[2]), pose[9 + row]);
-            line[row] = x.mul_add(simd.splat(patch.first[0]), y.mul_add(simd.splat(patch.first[1]), start));
-            next[row] = x * simd.splat(patch.step[0]);
-            next_line[row] = y * simd.splat(patch.step[1]);
-        }
+        let way = Way::new(simd, patch, pose);
+        let mut line = way.first;
         for _ in 0..patch.counts[1] {
             let mut point = line;
             for _ in 0..patch.counts[0] {
@@ -166,13 +159,9 @@ fn sum<S: Simd, const PARTLY: bool>(
                     y = y.keep(in_sight);
                 }
                 moments.add(x, y);
-                for row in 0..3 {
-                    point[row] = point[row] + next[row];
-                }
+                advance(&mut point, &way.next);
             }
-            for row in 0..3 {
-                line[row] = line[row] + next_line[row];
-            }
+            advance(&mut line, &way.next_line);
         }
     }
     (moments, seen)

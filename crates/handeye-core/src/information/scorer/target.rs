@@ -1,6 +1,7 @@
 //! The points of a target, arranged so that neighbours share work.
 
 use crate::camera::Feature;
+use crate::simd::{Simd, Vector};
 
 /// Places that differ by less, in sizes of the target, are one: what rounding makes of a regular grid.
 const ROUNDING: f64 = 1e-14;
@@ -23,6 +24,39 @@ impl Patch {
             let along = (0..self.counts[0]).map(move |i| self.step[0].mul_add(i as f64, x));
             (self.step[1].mul_add(j as f64, y), z, along)
         })
+    }
+}
+
+/// A way over a patch, in the camera frame: from each point to the next, and from each line to the next.
+pub(super) struct Way<V> {
+    pub first: [V; 3],
+    pub next: [V; 3],
+    pub next_line: [V; 3],
+}
+
+impl<V: Vector> Way<V> {
+    /// For a patch at a pose.
+    #[inline(always)]
+    pub fn new<S: Simd<Vector = V>>(simd: S, patch: &Patch, pose: &[V; 12]) -> Self {
+        let zero = [simd.splat(0.0); 3];
+        let mut way = Self { first: zero, next: zero, next_line: zero };
+        for row in 0..3 {
+            let [x, y, z] = [pose[3 * row], pose[3 * row + 1], pose[3 * row + 2]];
+            let start = z.mul_add(simd.splat(patch.first[2]), pose[9 + row]);
+            let start = y.mul_add(simd.splat(patch.first[1]), start);
+            way.first[row] = x.mul_add(simd.splat(patch.first[0]), start);
+            way.next[row] = x * simd.splat(patch.step[0]);
+            way.next_line[row] = y * simd.splat(patch.step[1]);
+        }
+        way
+    }
+}
+
+/// Goes a step.
+#[inline(always)]
+pub(super) fn advance<V: Vector>(point: &mut [V; 3], step: &[V; 3]) {
+    for row in 0..3 {
+        point[row] = point[row] + step[row];
     }
 }
 
