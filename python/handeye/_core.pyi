@@ -96,15 +96,15 @@ def fit_corners(
     radii: ArrayLike,
     bands: ArrayLike,
     is_crossing: bool,
-    settle: bool,
+    rough: bool,
 ) -> NDArray[float64]:
     """Corners (N, 2) fitted to grey values; NaN where there is none near the guess.
 
     `image` (H, W) is contiguous. `places` (N, 2) are guesses, `directions` (N, 2, 2) those of the two edges,
     `curvatures` (N, 2) theirs in 1 / px towards the normals (-sin, cos); `radii` (N,) are free of other edges
     and `bands` (N,) the distances from the edges, in pixels, beyond which there is something else. At a
-    crossing diagonal parts are equal and the light may change; else the four parts may be of any grey. With
-    `settle` a window in which the corner was not in the middle is laid anew around it.
+    crossing diagonal parts are equal and the light may change; else the four parts may be of any grey. A
+    `rough` fit ends near the place, as is enough where it tells another fit where to begin.
     """
 
 def area_centroids(

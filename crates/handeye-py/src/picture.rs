@@ -48,7 +48,7 @@ fn fit_corners<'py>(
     radii: Array<'py>,
     bands: Array<'py>,
     is_crossing: bool,
-    settle: bool,
+    rough: bool,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let places = convert::vectors::<2>(py, "places", &places)?;
     let directions = convert::matrices::<2, 2>(py, "directions", &directions)?;
@@ -68,7 +68,7 @@ fn fit_corners<'py>(
     });
     let found = py.detach(|| {
         let mut fitter = CornerFitter::new(picture, kind);
-        guesses.flat_map(|guess| fitter.fit(&guess, settle).unwrap_or([f64::NAN; 2])).collect()
+        guesses.flat_map(|guess| fitter.fit(&guess, rough).unwrap_or([f64::NAN; 2])).collect()
     });
     Ok(convert::array(py, &[n, 2], found))
 }

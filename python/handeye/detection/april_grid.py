@@ -7,7 +7,16 @@ import numpy as np
 
 from handeye import _core
 from handeye.detection.base import Detection, Image, NotFound, Reason, inside, ordered
-from handeye.detection.corner_fit import ASTRAY_PX, CornerKind, astray, fit_corners
+from handeye.detection.corner_fit import (
+    ASTRAY_PX,
+    FEW,
+    WIDE_PX,
+    CornerKind,
+    astray,
+    fit_corners,
+    nearer,
+    spread,
+)
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.markers import (
     LEAST_SHARE,
@@ -66,7 +75,7 @@ def find(image: Image, target: AprilGrid) -> Detection | NotFound:
     expected = from_neighbours(plane, seen.reshape(-1, 2))
     astray = np.linalg.norm(expected - seen.reshape(-1, 2), axis=1) > ASTRAY_PX
     seen = np.where(astray[:, np.newaxis], expected, seen.reshape(-1, 2)).reshape(-1, 4, 2)
-    rough = _measured(image, target, seen, None)
+    rough = _measured(image, target, seen, None, rough=True)
     good = np.flatnonzero(np.isfinite(rough[:, 0]))
     lens = _core.PlaneMap.fitted(plane[good], rough[good]) if len(good) >= 4 else None
     if lens is None:
@@ -91,9 +100,15 @@ def confirm(image: Image, target: AprilGrid, board: Aligned) -> Detection | None
     if read.sum() < max(FEWEST_TAGS, LEAST_SHARE * expected.sum()):
         return None
     ids = (4 * np.flatnonzero(read)[:, np.newaxis] + np.arange(4)).ravel()
-    corners = places[read].reshape(-1, 2)
-    steps = board.steps(plane[ids])
-    sharp = _measured(image, target, places[read], steps, settle=True)
+    corners, plane = places[read].reshape(-1, 2), plane[ids]
+    steps = board.steps(plane)
+    band = BAND_SHARE * _border(target) * target.tag_m * np.linalg.norm(steps, axis=2).min()
+    tags = spread(len(places[read]), FEW // 4 if band >= WIDE_PX else len(places[read]))
+    some = (4 * tags[:, np.newaxis] + np.arange(4)).ravel()
+    near = _measured(image, target, places[read][tags], steps[some], rough=True)
+    # Then it is known well enough where all are, so that where they were put matters no more.
+    again, steps = nearer(plane, corners, steps, some, near)
+    sharp = _measured(image, target, again.reshape(-1, 4, 2), steps)
     good = ~astray(sharp, corners, target.tag_m * np.linalg.norm(steps, axis=2).min(axis=1))
     if good.sum() < max(4, LEAST_SHARE * 4 * expected.sum()):
         return None
@@ -124,8 +139,14 @@ def _tags(image: Image, target: AprilGrid) -> tuple[IndexArray, FloatArray]:
     return ids, seen
 
 
+def _border(target: AprilGrid) -> float:
+    """Return what is free of other edges along a tag's, as a share of its side."""
+    bits = {"16h5": 4, "25h9": 5}.get(target.dictionary.rsplit("_", 1)[-1], 6)
+    return min(target.border_bits / (bits + 2 * target.border_bits), target.spacing_ratio)
+
+
 def _measured(
-    image: Image, target: AprilGrid, tags: FloatArray, steps: FloatArray | None, settle: bool = False
+    image: Image, target: AprilGrid, tags: FloatArray, steps: FloatArray | None, rough: bool = False
 ) -> FloatArray:
     """Return the corners (4 M, 2) of tags (M, 4, 2) as fitted, NaN where that fails.
 
@@ -140,14 +161,12 @@ def _measured(
         directions = np.tile(_SIDES, (len(tags), 1, 1)) @ steps
     directions = directions / np.linalg.norm(directions, axis=2, keepdims=True)
     height = lengths * np.abs(np.linalg.det(directions))
-    bits = {"16h5": 4, "25h9": 5}.get(target.dictionary.rsplit("_", 1)[-1], 6)
-    border = target.border_bits / (bits + 2 * target.border_bits)
     return fit_corners(
         image,
         tags.reshape(-1, 2),
         directions,
         WINDOW_SHARE * target.spacing_ratio * height,
         CornerKind.QUADRANTS,
-        bands=BAND_SHARE * min(border, target.spacing_ratio) * height,
-        settle=settle,
+        bands=BAND_SHARE * _border(target) * height,
+        rough=rough,
     )

@@ -14,7 +14,7 @@ from handeye.detection.base import (
     inside,
     ordered,
 )
-from handeye.detection.corner_fit import CornerKind, astray, fit_corners
+from handeye.detection.corner_fit import FEW, WIDE_PX, CornerKind, astray, fit_corners, nearer, spread
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.markers import (
     LEAST_SHARE,
@@ -77,7 +77,8 @@ def find(image: Image, target: Charuco) -> Detection | NotFound:
     if number >= FEWEST_CORNERS:
         corners = np.asarray(found, dtype=np.float64).reshape(-1, 2)
         numbers = np.asarray(found_ids, dtype=np.int64).ravel()
-        rough = _measured(image, target, corners, _steps(corners, places[ids[known]], seen[known]))
+        steps = _steps(corners, places[ids[known]], seen[known])
+        rough = _measured(image, target, corners, steps, rough=True)
         good = np.isfinite(rough).all(axis=1)
         numbers, rough = numbers[good], rough[good]
         # Once more: all corners together tell the directions of edges better than a marker does.
@@ -111,9 +112,15 @@ def confirm(image: Image, target: Charuco, board: Aligned) -> Detection | None:
     ids = np.flatnonzero(known & seen & (board.likeness(plane) >= LEAST_LIKENESS))
     if len(ids) < FEWEST_CORNERS:
         return None
-    steps = board.steps(plane[ids])
-    sharp = _measured(image, target, corners[ids], steps, settle=True)
-    good = ~astray(sharp, corners[ids], target.square_m * np.linalg.norm(steps, axis=2).min(axis=1))
+    corners, plane = corners[ids], plane[ids]
+    steps = board.steps(plane)
+    band = BAND_SHARE * (target.square_m - target.marker_m) / 2 * np.linalg.norm(steps, axis=2).min()
+    some = spread(len(corners), FEW if band >= WIDE_PX else len(corners))
+    near = _measured(image, target, corners[some], steps[some], rough=True)
+    # Then it is known well enough where all are, so that where they were put matters no more.
+    again, steps = nearer(plane, corners, steps, some, near)
+    sharp = _measured(image, target, again, steps)
+    good = ~astray(sharp, corners, target.square_m * np.linalg.norm(steps, axis=2).min(axis=1))
     if good.sum() < max(FEWEST_CORNERS, LEAST_SHARE * seen.sum()):
         return None
     return ordered(target, ids[good], sharp[good])
@@ -133,7 +140,7 @@ def _steps(corners: FloatArray, places: FloatArray, markers: FloatArray) -> Floa
 
 
 def _measured(
-    image: Image, target: Charuco, corners: FloatArray, steps: FloatArray, settle: bool = False
+    image: Image, target: Charuco, corners: FloatArray, steps: FloatArray, rough: bool = False
 ) -> FloatArray:
     """Return the corners (N, 2) as fitted, NaN where that fails."""
     lengths = np.linalg.norm(steps, axis=2)
@@ -148,5 +155,5 @@ def _measured(
         WINDOW_SHARE * target.square_m * scale,
         CornerKind.CROSSING,
         bands=BAND_SHARE * free * scale,
-        settle=settle,
+        rough=rough,
     )

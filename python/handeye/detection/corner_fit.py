@@ -12,14 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handeye import _core
-from handeye.detection.base import Image
-from handeye.types.arrays import FloatArray
+from handeye.detection.base import Image, affine
+from handeye.types.arrays import FloatArray, IndexArray
 
 # Half the width of the strip along each edge that is looked at.
 BAND_PX = 4.0
 # Corners further than this from where others put them are not what they seem; where a board is near, so that
 # a pitch is many pixels, further than a share of it.
 ASTRAY_PX, ASTRAY_SHARE = 1.5, 0.06
+# Fewer corners do not tell where the others are; so many do.
+FEWEST_TOLD, FEW = 6, 16
+# Where strips are narrower than this all corners must tell: then it matters most where they lie.
+WIDE_PX = 5.0
+# Directions are taken over this share of a board.
+TOLD_SHARE = 0.02
 
 
 class CornerKind(Enum):
@@ -37,6 +43,37 @@ def astray(found: FloatArray, expected: FloatArray, pitches_px: FloatArray) -> N
     return ~(away <= np.maximum(ASTRAY_PX, ASTRAY_SHARE * pitches_px))
 
 
+def spread(count: int, few: int) -> IndexArray:
+    """Return some of so many numbers, evenly spread."""
+    return np.unique(np.linspace(0, count - 1, min(count, few)).round().astype(np.int64))
+
+
+def nearer(
+    plane: FloatArray, expected: FloatArray, steps: FloatArray, some: IndexArray, found: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return where corners (N, 2) are, and the pixels (N, 2, 2) per metre there, as some or all of them tell.
+
+    Parameters
+    ----------
+    plane, expected, steps
+        (N, 2) places on the board and in the image, and (N, 2, 2) pixels per metre along both axes.
+    some, found
+        (M,) which were looked at, and (M, 2) where they are.
+    """
+    off = found - expected[some]
+    good = np.linalg.norm(off, axis=1) <= ASTRAY_PX
+    if good.sum() < FEWEST_TOLD:
+        return expected, steps
+    if len(some) < len(plane):
+        A, b = affine(plane[some[good]], off[good])
+        return expected + plane @ A + b, steps + A
+    lens = _core.PlaneMap.fitted(plane[good], found[good])
+    if lens is None:
+        return expected, steps
+    directions = lens.steps(plane, TOLD_SHARE * float(np.ptp(plane, axis=0).max()))
+    return np.where(good[:, np.newaxis], found, expected), directions
+
+
 def fit_corners(
     image: Image,
     corners: FloatArray,
@@ -45,7 +82,7 @@ def fit_corners(
     kind: CornerKind,
     curvatures: FloatArray | None = None,
     bands: FloatArray | None = None,
-    settle: bool = False,
+    rough: bool = False,
 ) -> FloatArray:
     """Return corners (N, 2), NaN where the fit fails.
 
@@ -64,9 +101,8 @@ def fit_corners(
         edges. None for straight ones.
     bands
         (N,) distance from the edges, in pixels, beyond which there is something else; None for nothing.
-    settle
-        Whether windows in which the corner was not in the middle are laid anew around it, so that the guess
-        matters little.
+    rough
+        Whether to end near the places, as is enough to begin once more from there.
     """
     return _core.fit_corners(
         image,
@@ -76,5 +112,5 @@ def fit_corners(
         radii,
         np.full(len(corners), BAND_PX) if bands is None else bands,
         kind is CornerKind.CROSSING,
-        settle,
+        rough,
     )

@@ -23,7 +23,7 @@ const SURROUNDINGS: f64 = 1.6;
 /// Added to the contrast, in grey values, where there is next to none.
 const GREY_FLOOR: f32 = 4.0;
 const MAX_ITERATIONS: usize = 15;
-const STEP_TOLERANCE_PX: f64 = 0.04;
+const STEP_TOLERANCE_PX: f64 = 0.1;
 /// Correlation with the picture below which there is no use in going on.
 const LEAST_CORRELATION: f32 = 0.2;
 /// Grey of what is outside the image.

@@ -11,20 +11,21 @@ use super::corner_window::{SMOOTHING_PX, Window};
 use crate::simd::{VectorUnit, dispatch};
 
 /// Radii of windows in pixels; what is asked for is clamped to them.
-pub const RADIUS_RANGE_PX: [f64; 2] = [2.0, 30.0];
+pub const RADIUS_RANGE_PX: [f64; 2] = [2.0, 24.0];
 /// Half the width of the strip along each edge that is looked at.
 pub const BAND_PX: f64 = 4.0;
 const MAX_ITERATIONS: usize = 12;
-const STEP_TOLERANCE_PX: f64 = 5e-4;
+/// Steps below which a fit is at its end, and below which it is near: then another window is laid around it.
+const STEP_TOLERANCE_PX: f64 = 1e-3;
+const ROUGH_TOLERANCE_PX: f64 = 0.01;
+/// A window of this radius is enough to come near.
+const ROUGH_RADIUS_PX: f64 = 16.0;
 /// A pixel alone blurs like a Gaussian of 0.29 px; more than 4 px is no corner.
 const BLUR_RANGE_PX: [f64; 2] = [0.25, 4.0];
 /// Least grey step across an edge.
 const LEAST_CONTRAST: f64 = 4.0;
 /// Least share of the window that lies inside the picture.
 const LEAST_INSIDE: f64 = 0.75;
-/// A window is where it belongs if its corner is so near to its middle, per squared half width of the strips: the
-/// wider they are, the less it matters.
-const SETTLED: f64 = 0.008;
 
 type Parameters = SVector<f64, N>;
 
@@ -65,62 +66,56 @@ pub struct CornerFitter<'a, T> {
     kind: CornerKind,
     unit: VectorUnit,
     window: Window,
+    /// That of the corner before, which is much the same all over a picture.
+    log_blur: f64,
 }
 
 impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
     /// A fitter for corners of one kind.
     pub fn new(picture: Picture<'a, T>, kind: CornerKind) -> Self {
-        Self { picture, kind, unit: VectorUnit::widest(), window: Window::default() }
+        Self {
+            picture,
+            kind,
+            unit: VectorUnit::widest(),
+            window: Window::default(),
+            log_blur: SMOOTHING_PX.ln(),
+        }
     }
 
     /// Fits a corner; `None` where there is none, or where it is not near the guess.
     ///
-    /// With `settle` a window in which the corner was not in the middle is laid anew around it, so that the guess
-    /// matters little.
-    pub fn fit(&mut self, guess: &CornerGuess, settle: bool) -> Option<[f64; 2]> {
+    /// A `rough` fit ends near the place, as is enough where it tells another fit where to begin.
+    pub fn fit(&mut self, guess: &CornerGuess, rough: bool) -> Option<[f64; 2]> {
         if !guess.is_usable() {
             return None;
         }
-        let radius = guess.radius.clamp(RADIUS_RANGE_PX[0], RADIUS_RANGE_PX[1]);
+        let largest = if rough { ROUGH_RADIUS_PX } else { RADIUS_RANGE_PX[1] };
+        let radius = guess.radius.clamp(RADIUS_RANGE_PX[0], largest);
         let guess = CornerGuess { radius, band: guess.band.min(BAND_PX), ..*guess };
-        let fit = self.fitted(&guess, None)?;
-        let place = [fit[X], fit[Y]];
-        let away = (place[0] - guess.place[0]).hypot(place[1] - guess.place[1]);
-        if !settle || away <= SETTLED * guess.band * guess.band {
-            return Some(place);
-        }
-        let fit = self.fitted(&CornerGuess { place, ..guess }, Some(fit))?;
-        Some([fit[X], fit[Y]])
-    }
-
-    /// Fits in the window around a guess, from there or from what was found before; places are of the picture.
-    fn fitted(&mut self, guess: &CornerGuess, before: Option<Parameters>) -> Option<Parameters> {
-        let share_inside = self.window.lay(self.unit, &self.picture, guess);
+        let share_inside = self.window.lay(self.unit, &self.picture, &guess);
         if share_inside < LEAST_INSIDE {
             return None;
         }
         let origin = self.window.origin.map(|x| x as f64);
-        let mut start = before.unwrap_or_else(|| {
-            let mut start = Parameters::zeros();
-            for (i, d) in [FIRST, SECOND].into_iter().zip(guess.directions) {
-                start[i] = d[1].atan2(d[0]);
-            }
-            start[LOG_BLUR] = SMOOTHING_PX.ln();
-            start
-        });
+        let mut start = Parameters::zeros();
         start[X] = guess.place[0] - origin[0];
         start[Y] = guess.place[1] - origin[1];
-        if before.is_none() {
-            self.solve_greys(&mut start)?;
+        for (i, d) in [FIRST, SECOND].into_iter().zip(guess.directions) {
+            start[i] = d[1].atan2(d[0]);
         }
-        let mut fit = self.minimised(start, guess.curvatures)?;
+        start[LOG_BLUR] = self.log_blur;
+        self.solve_greys(&mut start)?;
+        let tolerance = if rough { ROUGH_TOLERANCE_PX } else { STEP_TOLERANCE_PX };
+        let fit = self.minimised(start, guess.curvatures, tolerance)?;
         let moved = (fit[X] - start[X]).hypot(fit[Y] - start[Y]);
-        let good = moved <= (0.25 * guess.radius).max(1.5)
+        let good = moved <= (0.25 * radius).max(1.5)
             && fit[PRODUCT].abs() * 2.0 >= LEAST_CONTRAST
             && fit[LOG_BLUR] < BLUR_RANGE_PX[1].ln() - 1e-6;
-        fit[X] += origin[0];
-        fit[Y] += origin[1];
-        good.then_some(fit)
+        if !good {
+            return None;
+        }
+        self.log_blur = fit[LOG_BLUR];
+        Some([origin[0] + fit[X], origin[1] + fit[Y]])
     }
 
     /// Solves for the greys, which enter linearly, once for the first guess of the rest.
@@ -136,7 +131,7 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
     }
 
     /// Levenberg-Marquardt.
-    fn minimised(&self, mut p: Parameters, bends: [f64; 2]) -> Option<Parameters> {
+    fn minimised(&self, mut p: Parameters, bends: [f64; 2], tolerance: f64) -> Option<Parameters> {
         let mut current = self.equations(&p, bends);
         let mut damping = 1e-3;
         for _ in 0..MAX_ITERATIONS {
@@ -148,7 +143,7 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
             step[LOG_BLUR] = step[LOG_BLUR].clamp(-0.5, 0.5);
             let mut trial = p + step;
             trial[LOG_BLUR] = trial[LOG_BLUR].clamp(BLUR_RANGE_PX[0].ln(), BLUR_RANGE_PX[1].ln());
-            if step[X].abs().max(step[Y].abs()) < STEP_TOLERANCE_PX {
+            if step[X].abs().max(step[Y].abs()) < tolerance {
                 // So short a step needs no proof.
                 p = trial;
                 break;
@@ -231,7 +226,11 @@ mod tests {
                 let grey = drawn(place, angles, 1.1, greys);
                 let picture = Picture::new(&grey, SIDE, SIDE).unwrap();
                 let start = guess([place[0] + 0.7, place[1] - 0.5], [angles[0] + 0.05, angles[1] - 0.04]);
-                let found = CornerFitter::new(picture, kind).fit(&start, true).unwrap();
+                let mut fitter = CornerFitter::new(picture, kind);
+                let near = fitter.fit(&start, true).unwrap();
+                let error = (near[0] - place[0]).hypot(near[1] - place[1]);
+                assert!(error < 0.05, "{kind:?} {place:?}: {error}");
+                let found = fitter.fit(&CornerGuess { place: near, ..start }, false).unwrap();
                 let error = (found[0] - place[0]).hypot(found[1] - place[1]);
                 assert!(error < 1e-3, "{kind:?} {place:?}: {error}");
             }

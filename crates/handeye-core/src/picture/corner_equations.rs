@@ -20,31 +20,34 @@ pub(super) const PRODUCT: usize = 8;
 
 /// Further from an edge than so many deviations of the blur there is only one side.
 const FAR: f64 = 6.0;
+/// Vectors of pixels whose products are added up together.
+const BLOCK: usize = 16;
 /// Weight of what only fills the last vector, before it is weighed.
 const NOT_THERE: f64 = -1.0;
 
-/// Pixels of a window: places relative to the window's origin, grey values and weights.
+/// Pixels of a window: places relative to the window's origin, grey values and square roots of weights.
 #[derive(Default)]
 pub(super) struct Samples {
     pub x: Vec<f64>,
     pub y: Vec<f64>,
     pub grey: Vec<f64>,
-    pub weight: Vec<f64>,
+    pub root: Vec<f64>,
 }
 
 impl Samples {
     pub fn clear(&mut self) {
-        for values in [&mut self.x, &mut self.y, &mut self.grey, &mut self.weight] {
+        for values in [&mut self.x, &mut self.y, &mut self.grey, &mut self.root] {
             values.clear();
         }
     }
 
-    /// Adds neighbours of a row, the first of them at a place, weighed by their columns.
-    pub fn extend(&mut self, [column, row]: [i64; 2], greys: &[f32], weight: impl Fn(i64) -> f64) {
-        self.x.extend((column..).take(greys.len()).map(|u| u as f64));
-        self.weight.extend((column..).take(greys.len()).map(weight));
+    /// Adds neighbours of a row, the first of them at a place, all with one weight.
+    pub fn extend(&mut self, [column, row]: [i64; 2], greys: &[f32], weight: f64) {
+        let first = column as f64;
+        self.x.extend((0_u32..).zip(greys).map(|(i, _)| first + f64::from(i)));
         self.y.resize(self.x.len(), row as f64);
         self.grey.extend(greys.iter().copied().map(f64::from));
+        self.root.resize(self.x.len(), weight);
     }
 
     /// Fills the last vector with pixels that do not count.
@@ -53,7 +56,7 @@ impl Samples {
         for values in [&mut self.x, &mut self.y, &mut self.grey] {
             values.resize(length, 0.0);
         }
-        self.weight.resize(length, NOT_THERE);
+        self.root.resize(length, NOT_THERE);
     }
 }
 
@@ -99,13 +102,15 @@ impl<const IS_CROSSING: bool> Kernel for Sum<'_, IS_CROSSING> {
         let turning = [sine * blur_squared, sine * correlation].map(|x| simd.splat(x) * p[PRODUCT]);
         let per_blur_squared = simd.splat(-1.0 / blur_squared);
         let zero = simd.splat(0.0);
-        let mut upper = [[zero; N]; N];
-        let mut right = [zero; N];
-        let mut cost = zero;
+        // Derivatives and residuals of some pixels first, then their products, one row of them at a time: more sums
+        // have no room in the registers.
+        let mut block = [[zero; N + 1]; BLOCK];
+        let mut filled = 0;
+        let mut sums = [[zero; N + 1]; N + 1];
         for at in (0..self.samples.x.len()).step_by(S::LANES) {
             let x = simd.load(&self.samples.x[at..]) - p[X];
             let y = simd.load(&self.samples.y[at..]) - p[Y];
-            let weight = simd.load(&self.samples.weight[at..]);
+            let root = simd.load(&self.samples.root[at..]);
             let first = edge(simd, x, y, turns[0], inverse_blur, half_bends[0]);
             let second = edge(simd, x, y, turns[1], inverse_blur, half_bends[1]);
             let slopes = first.slope * second.slope;
@@ -126,7 +131,8 @@ impl<const IS_CROSSING: bool> Kernel for Sum<'_, IS_CROSSING> {
             }
             let predicted = p[A].mul_add(basis[0], p[B].mul_add(basis[1], p[PRODUCT].mul_add(both, p[MEAN])));
             let (across_first, across_second) = (by_first * first.slope, by_second * second.slope);
-            let jacobian = [
+            let residual = simd.load(&self.samples.grey[at..]) - predicted;
+            let row = [
                 across_first.mul_add(turns[0][0], across_second * turns[1][0]) - drift[0],
                 -across_first.mul_add(turns[0][1], across_second * turns[1][1]) - drift[1],
                 -across_first.mul_add(first.along, turned),
@@ -136,28 +142,51 @@ impl<const IS_CROSSING: bool> Kernel for Sum<'_, IS_CROSSING> {
                 basis[0],
                 basis[1],
                 both,
+                residual,
             ];
-            let residual = simd.load(&self.samples.grey[at..]) - predicted;
-            cost = (weight * residual).mul_add(residual, cost);
-            for i in 0..N {
-                let weighted = weight * jacobian[i];
-                right[i] = weighted.mul_add(residual, right[i]);
-                for k in i..N {
-                    upper[i][k] = weighted.mul_add(jacobian[k], upper[i][k]);
-                }
+            for (to, value) in block[filled].iter_mut().zip(row) {
+                *to = root * value;
+            }
+            filled += 1;
+            if filled == BLOCK || at + S::LANES >= self.samples.x.len() {
+                let block = &block[..filled];
+                add_products::<S, 0>(block, &mut sums[0]);
+                add_products::<S, 1>(block, &mut sums[1]);
+                add_products::<S, 2>(block, &mut sums[2]);
+                add_products::<S, 3>(block, &mut sums[3]);
+                add_products::<S, 4>(block, &mut sums[4]);
+                add_products::<S, 5>(block, &mut sums[5]);
+                add_products::<S, 6>(block, &mut sums[6]);
+                add_products::<S, 7>(block, &mut sums[7]);
+                add_products::<S, 8>(block, &mut sums[8]);
+                add_products::<S, 9>(block, &mut sums[9]);
+                filled = 0;
             }
         }
         let mut normal = SMatrix::zeros();
-        let mut sums = SVector::zeros();
+        let mut right = SVector::zeros();
         for i in 0..N {
-            sums[i] = right[i].sum();
+            right[i] = sums[i][N].sum();
             for k in i..N {
-                normal[(i, k)] = upper[i][k].sum();
+                normal[(i, k)] = sums[i][k].sum();
                 normal[(k, i)] = normal[(i, k)];
             }
         }
-        Equations { normal, right: sums, cost: cost.sum() }
+        Equations { normal, right, cost: sums[N][N].sum() }
     }
+}
+
+/// Adds the products of one entry with itself and those after it.
+#[inline(always)]
+fn add_products<S: Simd, const ENTRY: usize>(block: &[[S::Vector; N + 1]], sums: &mut [S::Vector; N + 1]) {
+    let mut here = *sums;
+    for row in block {
+        let factor = row[ENTRY];
+        for k in ENTRY..=N {
+            here[k] = factor.mul_add(row[k], here[k]);
+        }
+    }
+    *sums = here;
 }
 
 /// Adds up the equations of the greys alone, for the rest as given; edges are taken as straight.
@@ -184,7 +213,8 @@ impl<const IS_CROSSING: bool> Kernel for Greys<'_, IS_CROSSING> {
             let x = simd.load(&self.samples.x[at..]) - place[0];
             let y = simd.load(&self.samples.y[at..]) - place[1];
             let grey = simd.load(&self.samples.grey[at..]);
-            let weight = simd.load(&self.samples.weight[at..]);
+            let root = simd.load(&self.samples.root[at..]);
+            let weight = root * root;
             let first = edge(simd, x, y, turns[0], inverse_blur, zero).side;
             let second = edge(simd, x, y, turns[1], inverse_blur, zero).side;
             let [a, b] = if IS_CROSSING { [x, y] } else { [first, second] };
@@ -265,10 +295,10 @@ mod tests {
             samples.x.push(place[0]);
             samples.y.push(place[1]);
             samples.grey.push(100.0 + 50.0 * random.normal());
-            samples.weight.push(random.normal().abs());
+            samples.root.push(random.normal().abs());
         }
         samples.pad();
-        samples.weight[169..].fill(0.0);
+        samples.root[169..].fill(0.0);
         samples
     }
 

@@ -13,6 +13,8 @@ pub(super) const SMOOTHING_PX: f64 = 1.0;
 /// Pixels on each side that smoothing takes in.
 const TAPS: i64 = 4;
 const WEIGHTS: usize = 9;
+/// Single values side by side.
+const LANES: usize = 16;
 
 /// The window of a corner, and room to work in.
 #[derive(Default)]
@@ -21,8 +23,7 @@ pub(super) struct Window {
     pub origin: [i64; 2],
     /// What the corner is fitted to.
     pub samples: Samples,
-    columns: Vec<f32>,
-    smooth: Vec<f32>,
+    smoothed: Smoothed,
 }
 
 impl Window {
@@ -45,20 +46,25 @@ impl Window {
         if is_far {
             return 0.0;
         }
-        let (columns, smooth) = (&mut self.columns, &mut self.smooth);
-        dispatch(unit, Smoothing { picture, origin: self.origin, reach, columns, smooth });
+        dispatch(unit, Smoothing { picture, origin: self.origin, reach, out: &mut self.smoothed });
         let offset = [guess.place[0] - column as f64, guess.place[1] - row as f64];
-        let side = 2 * reach + 1;
+        // Outside the picture there is nothing to be seen, which shows in the share.
+        let (least, most) = (-column, size[0] - 1 - column);
         for v in -reach..=reach {
             let is_row = (0..size[1]).contains(&(row + v));
+            let greys = self.smoothed.row(index(v + reach));
             for [from, to] in strips(guess, offset, v as f64, reach) {
                 if from > to {
                     continue;
                 }
-                let places = [from, to].map(|u| index((v + reach) * side + u + reach));
-                // Outside the picture there is nothing to be seen, which shows in the share.
-                let seen = |u: i64| f64::from(u8::from(is_row && (0..size[0]).contains(&(column + u))));
-                self.samples.extend([from, v], &self.smooth[places[0]..=places[1]], seen);
+                let ends = [from, from.max(least).min(to + 1), from.max(to.min(most) + 1), to + 1];
+                for (part, is_column) in ends.windows(2).zip([false, true, false]) {
+                    if part[0] < part[1] {
+                        let weight = f64::from(u8::from(is_row && is_column));
+                        let greys = &greys[index(part[0] + reach)..index(part[1] + reach)];
+                        self.samples.extend([part[0], v], greys, weight);
+                    }
+                }
             }
         }
         self.samples.pad();
@@ -95,13 +101,27 @@ fn strips(guess: &CornerGuess, offset: [f64; 2], row: f64, reach: i64) -> [[i64;
     [[first[0], first[1].max(second[1])], NONE]
 }
 
+/// A smoothed window, row by row, filled up to whole vectors; and room to work in.
+#[derive(Default)]
+struct Smoothed {
+    values: Vec<f32>,
+    stride: usize,
+    raw: Vec<f32>,
+    columns: Vec<f32>,
+}
+
+impl Smoothed {
+    fn row(&self, row: usize) -> &[f32] {
+        &self.values[row * self.stride..][..self.stride]
+    }
+}
+
 /// Smooths the grey values of a window; those outside the picture are those that a mirror at its edge would show.
 struct Smoothing<'a, 'p, T> {
     picture: &'a Picture<'p, T>,
     origin: [i64; 2],
     reach: i64,
-    columns: &'a mut Vec<f32>,
-    smooth: &'a mut Vec<f32>,
+    out: &'a mut Smoothed,
 }
 
 impl<T: Copy + Into<f32>> Kernel for Smoothing<'_, '_, T> {
@@ -114,33 +134,49 @@ impl<T: Copy + Into<f32>> Kernel for Smoothing<'_, '_, T> {
         let [width, height] = self.picture.size();
         let side = index(2 * self.reach + 1);
         let wide = side + WEIGHTS - 1;
-        // Down the columns first, then along the rows.
-        self.columns.resize(wide, 0.0);
-        self.smooth.clear();
+        let Smoothed { values, stride, raw, columns } = self.out;
+        *stride = side.next_multiple_of(LANES);
+        let raw_stride = *stride + LANES;
+        raw.resize(wide * raw_stride, 0.0);
         let first = column - self.reach - TAPS;
         let is_within = first >= 0 && column + self.reach + TAPS < width;
-        for v in row - self.reach..=row + self.reach {
-            self.columns.fill(0.0);
-            for (k, weight) in (-TAPS..=TAPS).zip(weights) {
-                let line = self.picture.row(mirrored(v + k, height));
-                if is_within {
-                    let greys = &line[index(first)..][..wide];
-                    for (sum, grey) in self.columns.iter_mut().zip(greys) {
-                        *sum += weight * (*grey).into();
-                    }
-                } else {
-                    for (sum, u) in self.columns.iter_mut().zip(first..) {
-                        *sum += weight * line[mirrored(u, width)].into();
-                    }
+        let begin = row - self.reach - TAPS;
+        for (v, out) in (begin..).zip(raw.chunks_exact_mut(raw_stride)) {
+            let line = self.picture.row(mirrored(v, height));
+            if is_within {
+                for (out, grey) in out.iter_mut().zip(&line[index(first)..][..wide]) {
+                    *out = (*grey).into();
+                }
+            } else {
+                for (out, u) in out[..wide].iter_mut().zip(first..) {
+                    *out = line[mirrored(u, width)].into();
                 }
             }
-            let start = self.smooth.len();
-            self.smooth.resize(start + side, 0.0);
-            let out = &mut self.smooth[start..];
-            for (k, weight) in weights.into_iter().enumerate() {
-                for (sum, column) in out.iter_mut().zip(&self.columns[k..k + side]) {
-                    *sum += weight * column;
+        }
+        // Down the columns, then along the rows.
+        columns.resize(raw_stride, 0.0);
+        values.resize(side * *stride, 0.0);
+        for (row, out) in values.chunks_exact_mut(*stride).enumerate() {
+            let lines = &raw[row * raw_stride..][..WEIGHTS * raw_stride];
+            for at in (0..raw_stride).step_by(LANES) {
+                let mut sum = [0.0_f32; LANES];
+                for k in 0..WEIGHTS {
+                    let part = &lines[k * raw_stride + at..][..LANES];
+                    for lane in 0..LANES {
+                        sum[lane] += weights[k] * part[lane];
+                    }
                 }
+                columns[at..at + LANES].copy_from_slice(&sum);
+            }
+            for at in (0..*stride).step_by(LANES) {
+                let mut sum = [0.0_f32; LANES];
+                for k in 0..WEIGHTS {
+                    let part = &columns[at + k..][..LANES];
+                    for lane in 0..LANES {
+                        sum[lane] += weights[k] * part[lane];
+                    }
+                }
+                out[at..at + LANES].copy_from_slice(&sum);
             }
         }
     }
@@ -179,7 +215,7 @@ impl Kernel for Weighing<'_> {
         let rim = simd.splat(self.guess.radius + 0.5);
         let strip = simd.splat(self.guess.band + 0.5);
         let (mut whole, mut inside) = (zero, zero);
-        let Samples { x, y, weight, .. } = self.samples;
+        let Samples { x, y, root, .. } = self.samples;
         for at in (0..x.len()).step_by(S::LANES) {
             let (x, y) = (simd.load(&x[at..]) - offset[0], simd.load(&y[at..]) - offset[1]);
             let [first, second] = directions.map(|d| d[0].mul_add(y, -(d[1] * x)).abs());
@@ -188,11 +224,11 @@ impl Kernel for Weighing<'_> {
             let near = (strip + (-first).max(-second)).max(zero);
             let within = (rim - x.mul_add(x, y * y).sqrt()).max(zero);
             let soft = (-(-near).max(-one)) * (-(-within).max(-one));
-            let seen = simd.load(&weight[at..]);
+            let seen = simd.load(&root[at..]);
             whole = whole + soft.keep(seen.at_least(zero));
             let counted = soft * seen.max(zero);
             inside = inside + counted;
-            counted.store(&mut weight[at..]);
+            counted.sqrt().store(&mut root[at..]);
         }
         [whole.sum(), inside.sum()]
     }

@@ -7,10 +7,10 @@ use super::single;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
 
 /// Products of pixels that a search over all shifts may take; with more, some rows stand for all.
-const BUDGET: usize = 800_000;
+const BUDGET: usize = 500_000;
 const FEWEST_ROWS: usize = 8;
 /// Shifts that are looked at with all rows after that.
-const CANDIDATES: usize = 12;
+const CANDIDATES: usize = 6;
 /// Variance of grey values below which there is nothing to be seen.
 const LEAST_VARIANCE: f64 = 0.25;
 /// Shifts side by side.
