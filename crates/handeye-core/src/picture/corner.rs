@@ -16,7 +16,7 @@ pub const RADIUS_RANGE_PX: [f64; 2] = [2.0, 24.0];
 pub const BAND_PX: f64 = 4.0;
 const MAX_ITERATIONS: usize = 12;
 /// Steps below which a fit is at its end, and below which it is near: then another window is laid around it.
-const STEP_TOLERANCE_PX: f64 = 1e-3;
+const STEP_TOLERANCE_PX: f64 = 5e-4;
 const ROUGH_TOLERANCE_PX: f64 = 0.01;
 /// A window of this radius is enough to come near.
 const ROUGH_RADIUS_PX: f64 = 16.0;
