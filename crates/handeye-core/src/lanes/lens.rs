@@ -15,6 +15,13 @@ pub(crate) struct Window {
     pub max_squared_radius: f64,
 }
 
+impl Window {
+    /// Whether it has no edges.
+    pub fn is_everything(&self) -> bool {
+        self.x == [f64::NEG_INFINITY, f64::INFINITY] && self.y == [f64::NEG_INFINITY, f64::INFINITY]
+    }
+}
+
 /// A point after the lens and the derivatives `[along_x, cross_x; cross_y, along_y]`.
 pub(crate) struct Bent<V> {
     pub x: V,

@@ -6,7 +6,7 @@ use crate::lanes::UPPER;
 use crate::simd::MAX_LANES;
 
 /// Candidates in a block: a multiple of every unit's lanes, few enough that a block stays in the nearest cache.
-pub(super) const BLOCK: usize = 4 * MAX_LANES;
+pub(super) const BLOCK: usize = 6 * MAX_LANES;
 
 /// One value per candidate of a block.
 pub(super) type Row = [f64; BLOCK];

@@ -12,9 +12,6 @@ use crate::simd::{Kernel, Mask, Simd, Vector};
 /// told well from where its points appear.
 const GRAZING: f64 = 1e-4;
 
-/// Stands for a window without an edge: no point is so far from the axis but at the camera's side.
-const FAR_OUT: f64 = 1e6;
-
 /// Sums the information, divided by `f_x^2`, of the points in sight of a plane `z = plane_z`, and counts them.
 ///
 /// With `CAMERA` also that of `f_x`, `f_y`, `c_x` and `c_y` as far as they are among the columns.
@@ -97,12 +94,6 @@ fn plane<S: Simd>(simd: S, pose: &[S::Vector; 12], plane_z: f64) -> Option<[S::V
 /// centre minus `|n| .` half size.
 #[inline(always)]
 fn whole<S: Simd>(simd: S, window: &Window, target: &Target, pose: &[S::Vector; 12]) -> bool {
-    // Edges in by a trace: whoever stands on one is looked at point by point.
-    let trace = |bound: f64| 1e-9 * (1.0 + bound.abs());
-    let low = |bound: f64| (bound + trace(bound)).max(-FAR_OUT);
-    let high = |bound: f64| (bound - trace(bound)).min(FAR_OUT);
-    let [left, right] = [low(window.x[0]), high(window.x[1])];
-    let [top, bottom] = [low(window.y[0]), high(window.y[1])];
     let half = [simd.splat(target.half_size[0]), simd.splat(target.half_size[1])];
     let mut centre = [simd.splat(0.0); 3];
     for row in 0..3 {
@@ -112,6 +103,15 @@ fn whole<S: Simd>(simd: S, window: &Window, target: &Target, pose: &[S::Vector; 
     }
     let nearest = half[0].neg_mul_add(pose[6].abs(), half[1].neg_mul_add(pose[7].abs(), centre[2]));
     let mut inside = nearest.greater(simd.splat(MIN_DEPTH_M));
+    if window.is_everything() {
+        return inside.all();
+    }
+    // Edges in by a trace: whoever stands on one is looked at point by point.
+    let trace = |bound: f64| 1e-9 * (1.0 + bound.abs());
+    let low = |bound: f64| bound + trace(bound);
+    let high = |bound: f64| bound - trace(bound);
+    let [left, right] = [low(window.x[0]), high(window.x[1])];
+    let [top, bottom] = [low(window.y[0]), high(window.y[1])];
     macro_rules! edge {
         // `row - bound * depth`, of which the sign must be that of `sign`.
         ($row:literal, $bound:expr, $sign:literal) => {
