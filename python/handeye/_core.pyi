@@ -117,7 +117,7 @@ def area_centroids(
     """
 
 def free_gaps(centres: ArrayLike, shapes: ArrayLike) -> NDArray[float64]:
-    """Narrowest free distances (N,) in pixels from the edge of each spot to that of another one, at least 1."""
+    """Narrowest free distances (N,) in pixels from the edge of each spot to that of another, at least 1."""
 
 class PlaneMap:
     """A map from the plane of a target, in metres, to pixels: a homography, and what a lens adds to it."""

@@ -37,7 +37,7 @@ def bench_scaling(options: Options, progress: Progress) -> dict[str, Any]:
         ),
         "score_points": (
             "1,000 candidates",
-            (500, 1000, 2000, 4000),
+            (1000, 2000, 4000, 8000),
             lambda n: _score(8, n, 1000, options),
         ),
         "score_views_taken": (
