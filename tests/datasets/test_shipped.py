@@ -19,8 +19,8 @@ def test_corners_are_those_that_detection_finds(rwhe_calib: Path, name: str) -> 
     assert isinstance(found, Detection)
     view = recording.view(name)
     np.testing.assert_array_equal(view.point_ids, found.point_ids)
-    # Shipped as an earlier version measured them, which laid the windows once only.
-    np.testing.assert_allclose(view.pixels, found.pixels, atol=1e-3)
+    # Shipped as an earlier version measured them: it laid the windows once only, and larger.
+    np.testing.assert_allclose(view.pixels, found.pixels, atol=4e-3)
 
 
 def test_poses_are_those_of_the_set(rwhe_calib: Path) -> None:
