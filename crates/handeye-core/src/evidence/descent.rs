@@ -252,7 +252,7 @@ fn step<S: Simd>(
     }
     let (mut inverses, mut solution) = ([zero; UNKNOWNS], [zero; UNKNOWNS]);
     eliminate(simd, UNKNOWNS, f64::MIN_POSITIVE, system, &mut inverses);
-    substitute(simd, UNKNOWNS, system, &inverses, &mut solution);
+    substitute(UNKNOWNS, system, &inverses, &mut solution);
     let [a, b, c, d, e, f, g, h, i, j, k, l] = solution;
     ([a, b, c, d, e, f], [g, h, i, j, k, l])
 }

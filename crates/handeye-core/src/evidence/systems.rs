@@ -55,14 +55,7 @@ pub(super) fn eliminate<S: Simd>(
 
 /// The solution of what [`eliminate`] has left, with the sign of the right side changed.
 #[inline(always)]
-pub(super) fn substitute<S: Simd>(
-    simd: S,
-    n: usize,
-    system: &[S::Vector],
-    inverses: &[S::Vector],
-    solution: &mut [S::Vector],
-) {
-    let _ = simd;
+pub(super) fn substitute<V: Vector>(n: usize, system: &[V], inverses: &[V], solution: &mut [V]) {
     for i in (0..n).rev() {
         let row = start_of(n, i);
         let mut sum = -system[row + n - i];

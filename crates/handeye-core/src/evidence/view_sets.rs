@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::systems::{eliminate, entries_of, invert_column, substitute};
 use crate::error::Error;
-use crate::lanes::{UPPER, load, upper};
+use crate::lanes::{UPPER, load, triangle, upper};
 use crate::least_squares::Side;
 use crate::positive::Factor;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch, ln};
@@ -158,16 +158,6 @@ impl Flat {
     }
 }
 
-fn triangle(m: &Matrix6<f64>) -> [f64; UPPER] {
-    let mut out = [0.0; UPPER];
-    for i in 0..6 {
-        for j in i..6 {
-            out[upper(i, j)] = m[(i, j)];
-        }
-    }
-    out
-}
-
 struct Weigh<'a> {
     sets: &'a ViewSets,
     levels: &'a [NoiseLevel],
@@ -202,16 +192,16 @@ impl Kernel for Weigh<'_> {
             let variances = load(simd, &variances, 0);
             let likelihood = weigh(simd, sets, members, &variances, &mut room);
             let first = group * S::LANES;
-            scatter(simd, likelihood, &mut fit.log_likelihoods[first..first + levels.len()], 1);
+            scatter(likelihood, &mut fit.log_likelihoods[first..first + levels.len()], 1);
             for (i, mean) in room.mean.iter().enumerate() {
-                scatter(simd, *mean, &mut fit.means[first * n + i..(first + levels.len()) * n], n);
+                scatter(*mean, &mut fit.means[first * n + i..(first + levels.len()) * n], n);
             }
             let covariances = &mut fit.covariances[first * n * n..(first + levels.len()) * n * n];
             for i in 0..n {
                 invert_column(simd, n, i, &room.normal, &room.inverses, &mut room.column);
                 for j in i..n {
-                    scatter(simd, room.column[j], &mut covariances[i * n + j..], n * n);
-                    scatter(simd, room.column[j], &mut covariances[j * n + i..], n * n);
+                    scatter(room.column[j], &mut covariances[i * n + j..], n * n);
+                    scatter(room.column[j], &mut covariances[j * n + i..], n * n);
                 }
             }
         }
@@ -231,13 +221,12 @@ struct Room<V> {
     column: Vec<V>,
 }
 
-/// Writes lanes `stride` apart, as many as there is place for.
+/// Writes lanes `stride` apart, as many as there is place for, which is for no more than there are.
 #[inline(always)]
-fn scatter<S: Simd>(simd: S, vector: S::Vector, out: &mut [f64], stride: usize) {
-    let _ = simd;
+fn scatter<V: Vector>(vector: V, out: &mut [f64], stride: usize) {
     let mut lanes = [0.0; MAX_LANES];
     vector.store(&mut lanes);
-    for (place, lane) in out.iter_mut().step_by(stride).zip(&lanes[..S::LANES]) {
+    for (place, lane) in out.iter_mut().step_by(stride).zip(&lanes) {
         *place = *lane;
     }
 }
@@ -280,7 +269,7 @@ fn weigh<S: Simd>(
     }
     log_determinant =
         log_determinant + eliminate(simd, n, SMALLEST_PIVOT, &mut room.normal, &mut room.inverses);
-    substitute(simd, n, &room.normal, &room.inverses, &mut room.mean);
+    substitute(n, &room.normal, &room.inverses, &mut room.mean);
     // The squares summed one by one: what the normal equations leave of them is rounding where views are far off.
     let mut squares = zero;
     for white in room.white.chunks_exact(width) {

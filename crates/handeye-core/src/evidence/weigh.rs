@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, Matrix6};
 
 use super::hypotheses::Hypothesis;
 use super::smooth::SmoothError;
-use crate::lanes::{UPPER, factorise, log_pivots, upper};
+use crate::lanes::{UPPER, factorise, log_pivots, triangle, upper};
 use crate::least_squares::Side;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
 
@@ -57,16 +57,6 @@ impl View {
     pub fn left(&self) -> &Matrix6<f64> {
         &self.maps[0]
     }
-}
-
-fn triangle(m: &Matrix6<f64>) -> [f64; UPPER] {
-    let mut out = [0.0; UPPER];
-    for i in 0..6 {
-        for j in i..6 {
-            out[upper(i, j)] = m[(i, j)];
-        }
-    }
-    out
 }
 
 /// The whitened views summed up under each of some noises, whatever the offsets of the joints.

@@ -17,7 +17,7 @@ pub(crate) use factor::{factorise, log_pivots};
 pub(crate) use lens::{Bent, Window, bend};
 pub(crate) use moments::Sums;
 pub(crate) use plane_moments::PlaneMoments;
-pub(crate) use symmetric::{UPPER, upper};
+pub(crate) use symmetric::{UPPER, triangle, upper};
 pub(crate) use transform::{entries, left_product, right_product};
 
 /// Lanes `at..` of each row.

@@ -271,7 +271,7 @@ proptest! {
 
 /// Parameters of a camera without distortion, in any order.
 #[test]
-fn sums_of_few_monomials_serve_the_camera_too() {
+fn moments_of_a_plane_serve_the_camera_too() {
     for (seed, camera) in [vec![0, 1, 2, 3], vec![3, 0, 2], vec![1], vec![2, 1, 3, 0]].into_iter().enumerate()
     {
         let random = &mut Random::new(20 + seed as u64);
