@@ -6,6 +6,7 @@
 pub mod camera;
 pub mod closed_form;
 pub mod error;
+pub mod estimation;
 pub mod evidence;
 pub mod information;
 pub mod kinematics;

@@ -334,7 +334,7 @@ fn start_slack() -> Matrix6<f64> {
 }
 
 /// What is believed after some views.
-#[pyclass(frozen, module = "handeye._core")]
+#[pyclass(frozen, name = "OldPosterior", module = "handeye._core")]
 pub struct Posterior {
     inner: CorePosterior,
     hypotheses: Vec<Hypothesis>,

@@ -11,6 +11,7 @@ mod camera;
 mod closed_form;
 mod convert;
 mod errors;
+mod estimation;
 mod evidence;
 mod geometry;
 mod information;
@@ -27,6 +28,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     alignment::register(module)?;
     camera::register(module)?;
     closed_form::register(module)?;
+    estimation::register(module)?;
     evidence::register(module)?;
     geometry::register(module)?;
     kinematics::register(module)?;
