@@ -8,7 +8,7 @@ use std::hint::black_box;
 
 use handeye_core::camera::{Camera, Feature, Lens};
 use handeye_core::information::criteria::Entropy;
-use handeye_core::information::{Belief, CandidateModel, Execution, Motions, Sight};
+use handeye_core::information::{Belief, CandidateModel, Execution, Motions, Visibility};
 use handeye_core::least_squares::{Model, Options, Problem, RobotNoise, Side, Solution, Start, solve};
 use handeye_core::se3::Se3;
 use handeye_core::simd::VectorUnit;
@@ -117,7 +117,11 @@ fn count_score(repeats: usize, points: u32, distorted: bool, noisy: bool, unit: 
         robot: noisy.then(|| (robot.side, robot.square_roots[0])),
         pixel_parameters: None,
         kinematic_count: 0,
-        sight: Sight { image: Some([1280.0, 1024.0]), margin_px: 0.0, fewest: scene.features.len() },
+        visibility: Visibility {
+            image: Some([1280.0, 1024.0]),
+            margin_px: 0.0,
+            fewest: scene.features.len(),
+        },
     };
     let execution = Execution { unit, threads: 1 };
     for _ in 0..repeats {

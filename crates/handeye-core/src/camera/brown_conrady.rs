@@ -12,7 +12,7 @@
 use nalgebra::Matrix2;
 
 use super::region::{self, MAX_SQUARED_RADIUS};
-use super::{Bent, MAX_PARAMETERS, ParameterJacobian};
+use super::{DistortedPoint, MAX_PARAMETERS, ParameterJacobian};
 
 type Parameters = [f64; MAX_PARAMETERS];
 
@@ -24,7 +24,11 @@ fn fraction(p: &Parameters) -> ([f64; 4], [f64; 4]) {
 
 /// The point after the lens; `RATIONAL` and `PRISM` say whether `k4..k6` and `s1..s4` can differ from zero.
 #[inline]
-pub(super) fn bend<const RATIONAL: bool, const PRISM: bool>(p: &Parameters, x: f64, y: f64) -> Bent {
+pub(super) fn distort<const RATIONAL: bool, const PRISM: bool>(
+    p: &Parameters,
+    x: f64,
+    y: f64,
+) -> DistortedPoint {
     let (k1, k2, p1, p2, k3) = (p[4], p[5], p[6], p[7], p[8]);
     let (xx, yy, xy) = (x * x, y * y, x * y);
     let s = xx + yy;
@@ -37,7 +41,7 @@ pub(super) fn bend<const RATIONAL: bool, const PRISM: bool>(p: &Parameters, x: f
         slope = (slope - radial * (k4 + s * (2.0 * k5 + 3.0 * s * k6))) * inverse;
     }
     let cross = 2.0 * (xy * slope + p1 * x + p2 * y);
-    let mut bent = Bent {
+    let mut distorted = DistortedPoint {
         x: x * radial + 2.0 * p1 * xy + p2 * (s + 2.0 * xx),
         y: y * radial + p1 * (s + 2.0 * yy) + 2.0 * p2 * xy,
         jacobian: Matrix2::new(
@@ -49,12 +53,12 @@ pub(super) fn bend<const RATIONAL: bool, const PRISM: bool>(p: &Parameters, x: f
     };
     if PRISM {
         let (s1, s2, s3, s4) = (p[12], p[13], p[14], p[15]);
-        bent.x += s * (s1 + s * s2);
-        bent.y += s * (s3 + s * s4);
+        distorted.x += s * (s1 + s * s2);
+        distorted.y += s * (s3 + s * s4);
         let (along_x, along_y) = (2.0 * (s1 + 2.0 * s * s2), 2.0 * (s3 + 2.0 * s * s4));
-        bent.jacobian += Matrix2::new(along_x * x, along_x * y, along_y * x, along_y * y);
+        distorted.jacobian += Matrix2::new(along_x * x, along_x * y, along_y * x, along_y * y);
     }
-    bent
+    distorted
 }
 
 /// Derivative of the point after the lens in the coefficients: columns 4 to `COUNT` of `out`.
@@ -131,7 +135,7 @@ fn radial_factors(n: &[f64; 4], d: &[f64; 4], s: f64) -> (f64, f64) {
 }
 
 /// The point before the lens if it were purely radial: the start for Newton's method.
-pub(super) fn straighten_radially(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> (f64, f64) {
+pub(super) fn undistort_radially(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> (f64, f64) {
     let target = u.hypot(v);
     if target == 0.0 {
         return (0.0, 0.0);

@@ -102,15 +102,15 @@ impl Camera {
     fn observe_circle(&self, t_camera_target: &Se3, feature: &Feature) -> Option<Vector2<f64>> {
         let ellipse = Ellipse::of(t_camera_target, feature)?;
         let [x, y] = ellipse.centre;
-        let middle = self.bend(x, y)?;
+        let middle = self.distort(x, y)?;
         if self.lens == Lens::Pinhole {
             return Some(self.scale_and_shift(x, y));
         }
         let mut boundary = Boundary::default();
         for (i, at) in ellipse.boundary().iter().enumerate() {
-            let bent = self.bend(at[0], at[1])?;
-            boundary.x[i] = bent.x - middle.x;
-            boundary.y[i] = bent.y - middle.y;
+            let distorted = self.distort(at[0], at[1])?;
+            boundary.x[i] = distorted.x - middle.x;
+            boundary.y[i] = distorted.y - middle.y;
         }
         let (centroid, _) = boundary.centroid();
         Some(self.scale_and_shift(middle.x + centroid.x, middle.y + centroid.y))
@@ -125,7 +125,7 @@ impl Camera {
     ) -> Option<(Vector2<f64>, Matrix2x6<f64>)> {
         let ellipse = Ellipse::of(t_camera_target, feature)?;
         let [x, y] = ellipse.centre;
-        let middle = self.bend(x, y)?;
+        let middle = self.distort(x, y)?;
         // Gradients of the centroid's coordinates in centre and root of the ellipse.
         let (mut d_x, mut d_y) = ([1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0, 0.0]);
         let mut centroid = Vector2::new(middle.x, middle.y);
@@ -134,15 +134,15 @@ impl Camera {
             let mut boundary = Boundary::default();
             let mut lens = [Matrix2::zeros(); BOUNDARY];
             for i in 0..BOUNDARY {
-                let bent = self.bend(at[i][0], at[i][1])?;
-                boundary.x[i] = bent.x - middle.x;
-                boundary.y[i] = bent.y - middle.y;
-                lens[i] = bent.jacobian;
+                let distorted = self.distort(at[i][0], at[i][1])?;
+                boundary.x[i] = distorted.x - middle.x;
+                boundary.y[i] = distorted.y - middle.y;
+                lens[i] = distorted.jacobian;
             }
             let (offset, weights) = boundary.centroid();
             centroid += offset;
             (d_x, d_y) = ([0.0; 5], [0.0; 5]);
-            let mut d_bent = ParameterJacobian::zeros();
+            let mut d_distorted = ParameterJacobian::zeros();
             for i in 0..BOUNDARY {
                 let d_at = weights[i] * lens[i];
                 let (cos, sin) = CIRCLE[i];
@@ -154,9 +154,9 @@ impl Camera {
                     d[4] += sin * y;
                 }
                 if let Some(d_parameters) = d_parameters.as_mut() {
-                    self.bend_coefficients(at[i][0], at[i][1], &mut d_bent);
+                    self.distortion_derivatives(at[i][0], at[i][1], &mut d_distorted);
                     for column in 4..self.lens.parameter_count() {
-                        let d = weights[i] * d_bent.column(column);
+                        let d = weights[i] * d_distorted.column(column);
                         d_parameters[(0, column)] += d.x;
                         d_parameters[(1, column)] += d.y;
                     }

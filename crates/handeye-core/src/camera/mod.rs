@@ -106,7 +106,7 @@ pub struct Projection {
 
 /// A point of the plane at unit depth after the lens, with its derivative in the point before the lens.
 #[derive(Clone, Copy, Debug)]
-struct Bent {
+struct DistortedPoint {
     x: f64,
     y: f64,
     /// `[[dx/dx0, dx/dy0], [dy/dx0, dy/dy0]]`.
@@ -183,20 +183,20 @@ impl Camera {
 
     /// The point at unit depth after the lens; None outside the region where the lens is one-to-one.
     #[inline]
-    fn bend(&self, x: f64, y: f64) -> Option<Bent> {
+    fn distort(&self, x: f64, y: f64) -> Option<DistortedPoint> {
         let p = &self.parameters;
         // Written so that NaN falls through to None.
         if x * x + y * y <= self.max_squared_radius {
-            let bent = match self.lens {
-                Lens::Pinhole => return Some(pinhole::bend(x, y)),
-                Lens::BrownConrady4 | Lens::BrownConrady5 => brown_conrady::bend::<false, false>(p, x, y),
-                Lens::BrownConrady8 => brown_conrady::bend::<true, false>(p, x, y),
-                Lens::BrownConrady12 => brown_conrady::bend::<true, true>(p, x, y),
-                Lens::KannalaBrandt => kannala_brandt::bend(p, x, y),
+            let distorted = match self.lens {
+                Lens::Pinhole => return Some(pinhole::distort(x, y)),
+                Lens::BrownConrady4 | Lens::BrownConrady5 => brown_conrady::distort::<false, false>(p, x, y),
+                Lens::BrownConrady8 => brown_conrady::distort::<true, false>(p, x, y),
+                Lens::BrownConrady12 => brown_conrady::distort::<true, true>(p, x, y),
+                Lens::KannalaBrandt => kannala_brandt::distort(p, x, y),
             };
             // On the very edge rounding can make it singular, next to a pole NaN.
-            if bent.jacobian.determinant() > 0.0 {
-                return Some(bent);
+            if distorted.jacobian.determinant() > 0.0 {
+                return Some(distorted);
             }
         }
         None
@@ -204,7 +204,7 @@ impl Camera {
 
     /// Derivative of the point after the lens in the distortion coefficients, parameters 4 and on.
     #[inline]
-    fn bend_coefficients(&self, x: f64, y: f64, out: &mut ParameterJacobian) {
+    fn distortion_derivatives(&self, x: f64, y: f64, out: &mut ParameterJacobian) {
         let p = &self.parameters;
         match self.lens {
             Lens::Pinhole => {}
@@ -241,8 +241,8 @@ impl Camera {
     #[inline]
     pub fn project(&self, point: &Vector3<f64>) -> Option<Vector2<f64>> {
         let (x, y, _) = at_unit_depth(point)?;
-        let bent = self.bend(x, y)?;
-        Some(self.scale_and_shift(bent.x, bent.y))
+        let distorted = self.distort(x, y)?;
+        Some(self.scale_and_shift(distorted.x, distorted.y))
     }
 
     /// Pixel and its derivative in the point.
@@ -252,10 +252,10 @@ impl Camera {
         point: &Vector3<f64>,
     ) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let (x, y, inverse_depth) = at_unit_depth(point)?;
-        let bent = self.bend(x, y)?;
+        let distorted = self.distort(x, y)?;
         Some((
-            self.scale_and_shift(bent.x, bent.y),
-            self.point_derivative(x, y, inverse_depth, &bent.jacobian),
+            self.scale_and_shift(distorted.x, distorted.y),
+            self.point_derivative(x, y, inverse_depth, &distorted.jacobian),
         ))
     }
 
@@ -263,13 +263,13 @@ impl Camera {
     #[inline]
     pub fn project_with_derivatives(&self, point: &Vector3<f64>) -> Option<Projection> {
         let (x, y, inverse_depth) = at_unit_depth(point)?;
-        let bent = self.bend(x, y)?;
+        let distorted = self.distort(x, y)?;
         let mut d_parameters = ParameterJacobian::zeros();
-        self.bend_coefficients(x, y, &mut d_parameters);
-        self.finish_parameters(bent.x, bent.y, &mut d_parameters);
+        self.distortion_derivatives(x, y, &mut d_parameters);
+        self.finish_parameters(distorted.x, distorted.y, &mut d_parameters);
         Some(Projection {
-            pixel: self.scale_and_shift(bent.x, bent.y),
-            d_point: self.point_derivative(x, y, inverse_depth, &bent.jacobian),
+            pixel: self.scale_and_shift(distorted.x, distorted.y),
+            d_point: self.point_derivative(x, y, inverse_depth, &distorted.jacobian),
             d_parameters,
         })
     }
@@ -291,10 +291,10 @@ impl Camera {
         }
         let (x, y) = match self.lens {
             Lens::Pinhole => (u, v),
-            Lens::KannalaBrandt => kannala_brandt::straighten(p, self.max_squared_radius, u, v)?,
+            Lens::KannalaBrandt => kannala_brandt::undistort(p, self.max_squared_radius, u, v)?,
             _ => {
-                let start = brown_conrady::straighten_radially(p, self.max_squared_radius, u, v);
-                region::straighten(start, (u, v), |x, y| self.bend(x, y))?
+                let start = brown_conrady::undistort_radially(p, self.max_squared_radius, u, v);
+                region::undistort(start, (u, v), |x, y| self.distort(x, y))?
             }
         };
         let norm_squared = x * x + y * y;

@@ -1,10 +1,10 @@
-//! The lens that bends nothing.
+//! The lens that distorts nothing.
 
 use nalgebra::Matrix2;
 
-use super::Bent;
+use super::DistortedPoint;
 
 #[inline]
-pub(super) fn bend(x: f64, y: f64) -> Bent {
-    Bent { x, y, jacobian: Matrix2::identity() }
+pub(super) fn distort(x: f64, y: f64) -> DistortedPoint {
+    DistortedPoint { x, y, jacobian: Matrix2::identity() }
 }

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 use super::chain::WeakPrior;
 use super::systems::{eliminate, entries_of, start_of, substitute};
 use super::twists::{exponential, logarithm, product};
-use crate::lanes::{UPPER, entries, load, right_product, store, upper};
+use crate::batched_algebra::{UPPER, entries, load, right_product, store, upper};
 use crate::least_squares::through_chain;
 use crate::se3::Se3;
 use crate::simd::{Kernel, MAX_LANES, Mask, Simd, Vector, VectorUnit, dispatch};

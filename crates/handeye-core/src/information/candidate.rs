@@ -13,7 +13,7 @@ use crate::simd::VectorUnit;
 
 /// Which features a candidate is expected to see.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sight {
+pub struct Visibility {
     /// Image width and height, px; `None`: whatever the lens can project counts.
     pub image: Option<[f64; 2]>,
     /// Distance that a feature must keep from the image border, px.
@@ -42,7 +42,7 @@ pub struct CandidateModel<'a> {
     /// Number of kinematic parameters (their Jacobian comes with each candidate).
     pub kinematic_count: usize,
     /// What must be seen.
-    pub sight: Sight,
+    pub visibility: Visibility,
 }
 
 /// What may be so of the robot's error, and what is believed then.
@@ -116,7 +116,7 @@ impl CandidateModel<'_> {
     fn block(&self, motion: &Se3, joints: Option<&CandidateJoints>) -> Option<(ViewBlock, usize)> {
         let mut sums = self.sums();
         let seen = self.sum(&(self.x * *motion * self.y), &mut sums);
-        if seen < self.sight.fewest.max(1) {
+        if seen < self.visibility.fewest.max(1) {
             return None;
         }
         let (m, g) = sums.moments.finish();
@@ -168,8 +168,8 @@ impl CandidateModel<'_> {
 
     #[inline]
     fn in_image(&self, pixel: &Vector2<f64>) -> bool {
-        let margin = self.sight.margin_px;
-        match self.sight.image {
+        let margin = self.visibility.margin_px;
+        match self.visibility.image {
             None => true,
             Some([width, height]) => {
                 pixel.x >= margin

@@ -10,4 +10,6 @@ mod scorer;
 
 pub use belief::{Belief, entropy};
 pub(crate) use candidate::semidefinite_root;
-pub use candidate::{Candidate, CandidateJoints, CandidateModel, Execution, Motions, Sight, Supposition};
+pub use candidate::{
+    Candidate, CandidateJoints, CandidateModel, Execution, Motions, Supposition, Visibility,
+};

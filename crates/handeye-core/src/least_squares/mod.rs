@@ -5,6 +5,7 @@
 //! per view that is marginalised exactly. Twists perturb on the left: `X <- exp(xi_x) X`.
 
 mod accumulate;
+mod batched;
 mod engine;
 mod general;
 mod loss;
@@ -12,17 +13,16 @@ mod marginal;
 mod model;
 mod problem;
 mod report;
-mod side_by_side;
 mod solver;
 
 pub(crate) use accumulate::Moments;
 pub use accumulate::{PixelColumns, ViewBlock, view_block};
+pub(crate) use batched::through_chain;
 pub use loss::Loss;
 pub(crate) use marginal::marginalised;
 pub use model::{ChainPrior, KinematicParameters, Model, PixelParameters, RobotNoise, Side};
 pub use problem::{MIN_VIEWS, Problem};
 pub use report::{Ending, Solution, ViewReport};
-pub(crate) use side_by_side::through_chain;
 pub use solver::{Method, Options, Start, solve};
 
 #[cfg(test)]

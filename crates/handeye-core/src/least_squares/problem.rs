@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::side_by_side::Measurements;
+use super::batched::Measurements;
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
 use crate::se3::Se3;

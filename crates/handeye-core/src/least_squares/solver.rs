@@ -2,13 +2,13 @@
 //!
 //! Damping after Nielsen (1999), "Damping Parameter in Marquardt's Method", IMM-REP-1999-05.
 
+use super::batched::{BatchedEngine, Measurements, Workspace, fits};
 use super::engine::{Engine, Proposal};
 use super::general::General;
 use super::loss::Loss;
 use super::model::Model;
 use super::problem::{MIN_VIEWS, Problem};
 use super::report::{Ending, Solution};
-use super::side_by_side::{Desk, Measurements, SideBySide, fits};
 use crate::error::Error;
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
@@ -106,9 +106,10 @@ pub fn solve(
         packed.as_ref()
     };
     if let Some(measurements) = measurements {
-        let mut desk = Desk::new(VectorUnit::widest());
-        let mut engine = SideBySide::new(problem, model, options, views, measurements, start, &mut desk)
-            .map_err(hidden)?;
+        let mut workspace = Workspace::new(VectorUnit::widest());
+        let mut engine =
+            BatchedEngine::new(problem, model, options, views, measurements, start, &mut workspace)
+                .map_err(hidden)?;
         return Ok(iterate(&mut engine, options, samples));
     }
     let mut engine = General::new(problem, model, options.loss, views, start).map_err(hidden)?;

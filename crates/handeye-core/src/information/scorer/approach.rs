@@ -1,7 +1,7 @@
 //! From robot motions to camera poses: check that they are rigid, then `X A` and `X A Y`.
 
 use super::block::{BLOCK, Block};
-use crate::lanes::{left_product, right_product, store};
+use crate::batched_algebra::{left_product, right_product, store};
 use crate::se3::RIGID_TOLERANCE;
 use crate::simd::{Kernel, Mask, Simd, Vector};
 

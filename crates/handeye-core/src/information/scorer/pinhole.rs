@@ -4,8 +4,8 @@ use super::block::{BLOCK, Block};
 use super::forms::packed;
 use super::target::{Target, Way, advance};
 use super::wide_points::Column;
+use crate::batched_algebra::{PlaneMoments, Window, load, store, upper};
 use crate::camera::MIN_DEPTH_M;
-use crate::lanes::{PlaneMoments, Window, load, store, upper};
 use crate::simd::{Kernel, Mask, Simd, Vector};
 
 /// A plane nearer to the camera than this, in distances of the target, is seen from the side: inverse depths are not

@@ -1,15 +1,17 @@
 //! Residuals and their derivatives: the 6 x 6 information and gradient of each view, lanes = views.
 
 use super::measurements::{Group, Measurements, Point, Row, Whitening};
+use crate::batched_algebra::{
+    DistortedPoint, Sums, UPPER, distort, left_product, load, right_product, store, upper,
+};
 use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
-use crate::lanes::{Bent, Sums, UPPER, bend, left_product, load, right_product, store, upper};
 use crate::least_squares::Loss;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, ln};
 
 /// What a group of views is found to be at one state.
 #[derive(Clone)]
 #[repr(C, align(64))]
-pub(super) struct Sight {
+pub(super) struct LinearisedGroup {
     /// `X` and the robot's motion, its error included; then `T_camera_target`.
     pub before_y: [Row; 12],
     pub pose: [Row; 12],
@@ -24,7 +26,7 @@ pub(super) struct Sight {
     pub whole: Row,
 }
 
-impl Sight {
+impl LinearisedGroup {
     pub fn new() -> Self {
         const ZERO: Row = [0.0; MAX_LANES];
         Self {
@@ -45,11 +47,11 @@ pub(super) struct Optics {
     pub max_squared_radius: f64,
 }
 
-/// Looks at all views from a state.
+/// Linearises all views at a state.
 ///
-/// `DISTORTED` and `FULLY` say whether the lens bends and whether it does so with all of Brown's and Conrady's
+/// `DISTORTED` and `FULLY` say whether the lens distorts and whether it does so with all of Brown's and Conrady's
 /// terms; `ALIKE` that all points count alike: no robust loss and no covariances of points.
-pub(super) struct Look<'a, const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> {
+pub(super) struct Linearise<'a, const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> {
     pub x: &'a [f64; 12],
     pub y: &'a [f64; 12],
     /// Motions of each group with the robot's errors; none where the robot is exact.
@@ -59,11 +61,11 @@ pub(super) struct Look<'a, const DISTORTED: bool, const FULLY: bool, const ALIKE
     pub optics: &'a Optics,
     pub loss: Loss,
     pub measurements: &'a Measurements,
-    pub out: &'a mut [Sight],
+    pub out: &'a mut [LinearisedGroup],
 }
 
 impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> Kernel
-    for Look<'_, DISTORTED, FULLY, ALIKE>
+    for Linearise<'_, DISTORTED, FULLY, ALIKE>
 {
     type Output = ();
 
@@ -183,12 +185,12 @@ impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> How<'_, DISTOR
         let mut w = one / moved[2];
         let (mut x, mut y) = (moved[0] * w, moved[1] * w);
         let front = moved[2].greater(simd.splat(MIN_DEPTH_M));
-        let bent: Bent<S::Vector> = if DISTORTED {
-            bend::<S, FULLY, FULLY>(simd, &self.optics.parameters, x, y)
+        let distorted: DistortedPoint<S::Vector> = if DISTORTED {
+            distort::<S, FULLY, FULLY>(simd, &self.optics.parameters, x, y)
         } else {
-            Bent::straight(simd, x, y)
+            DistortedPoint::unchanged(simd, x, y)
         };
-        let in_sight = front & bent.is_valid(simd, self.optics.max_squared_radius);
+        let in_sight = front & distorted.is_valid(simd, self.optics.max_squared_radius);
         // Rows that a lane has no point for are zero.
         let counts = simd.load(&group.counts[at..]).greater(simd.splat(i as f64));
         view.whole = if RAGGED {
@@ -196,8 +198,8 @@ impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> How<'_, DISTOR
         } else {
             view.whole.keep(in_sight)
         };
-        let mut u = bent.x - simd.load(&point.seen[0][at..]);
-        let mut v = bent.y - simd.load(&point.seen[1][at..]);
+        let mut u = distorted.x - simd.load(&point.seen[0][at..]);
+        let mut v = distorted.y - simd.load(&point.seen[1][at..]);
         if RAGGED {
             (u, v) = (u.keep(counts), v.keep(counts));
         }
@@ -208,8 +210,8 @@ impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> How<'_, DISTOR
             view.add_pinhole(w, x, y, u, v);
             return;
         }
-        let (a, b) = (bent.along_x, bent.cross_x);
-        let (c, d) = (bent.cross_y * view.aspect, bent.along_y * view.aspect);
+        let (a, b) = (distorted.along_x, distorted.cross_x);
+        let (c, d) = (distorted.cross_y * view.aspect, distorted.along_y * view.aspect);
         v = v * view.aspect;
         let mut rows = [row(a, b, w, x, y), row(c, d, w, x, y)];
         view.squared = u.mul_add(u, v.mul_add(v, view.squared));

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
 use proptest::prelude::*;
 
-use super::{Desk, Measurements, SideBySide, fits};
+use super::{BatchedEngine, Measurements, Workspace, fits};
 use crate::camera::{Camera, Feature, Lens};
 use crate::least_squares::engine::smallest_pivot;
 use crate::least_squares::general::General;
@@ -60,7 +60,7 @@ fn by_lanes(
 ) -> Result<Solution, usize> {
     assert!(fits(problem, model));
     let measurements = Measurements::new(problem, views, model.robot.is_some()).expect("no circles");
-    SideBySide::new(problem, model, options, views, &measurements, start, &mut Desk::new(unit))
+    BatchedEngine::new(problem, model, options, views, &measurements, start, &mut Workspace::new(unit))
         .map(|mut engine| iterate(&mut engine, options, problem.pixels().len()))
 }
 
@@ -294,9 +294,10 @@ fn parts_of_views_add_up_to_views() {
             let expected = one_by_one(&problem, &model, &start, &views, &options).unwrap();
             for unit in VectorUnit::ALL {
                 let measured = &measurements;
-                let mut desk = Desk::new(unit);
+                let mut workspace = Workspace::new(unit);
                 let mut engine =
-                    SideBySide::new(&problem, &model, &options, &views, measured, &start, &mut desk).unwrap();
+                    BatchedEngine::new(&problem, &model, &options, &views, measured, &start, &mut workspace)
+                        .unwrap();
                 let found = iterate(&mut engine, &options, problem.pixels().len());
                 close(&found, &expected, &AT_ONE_POINT).unwrap();
             }

@@ -23,7 +23,7 @@ impl Window {
 }
 
 /// A point after the lens and the derivatives `[along_x, cross_x; cross_y, along_y]`.
-pub(crate) struct Bent<V> {
+pub(crate) struct DistortedPoint<V> {
     pub x: V,
     pub y: V,
     pub along_x: V,
@@ -37,10 +37,10 @@ pub(crate) struct Bent<V> {
     pub inverse_denominator: V,
 }
 
-impl<V: Vector> Bent<V> {
+impl<V: Vector> DistortedPoint<V> {
     /// A point that the lens leaves where it is.
     #[inline(always)]
-    pub fn straight<S: Simd<Vector = V>>(simd: S, x: V, y: V) -> Self {
+    pub fn unchanged<S: Simd<Vector = V>>(simd: S, x: V, y: V) -> Self {
         let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
         Self {
             x,
@@ -73,14 +73,14 @@ impl<V: Vector> Bent<V> {
     }
 }
 
-/// As `camera::brown_conrady::bend`.
+/// As `camera::brown_conrady::distort`.
 #[inline(always)]
-pub(crate) fn bend<S: Simd, const RATIONAL: bool, const PRISM: bool>(
+pub(crate) fn distort<S: Simd, const RATIONAL: bool, const PRISM: bool>(
     simd: S,
     p: &[f64; MAX_PARAMETERS],
     x: S::Vector,
     y: S::Vector,
-) -> Bent<S::Vector> {
+) -> DistortedPoint<S::Vector> {
     let (xx, yy, xy) = (x * x, y * y, x * y);
     let s = xx + yy;
     let (mut radial, mut twice_slope) = cubic(simd, [p[4], p[5], p[8]], s);
@@ -95,7 +95,7 @@ pub(crate) fn bend<S: Simd, const RATIONAL: bool, const PRISM: bool>(
     let (half_p1, half_p2) = (simd.splat(p[6]), simd.splat(p[7]));
     let cross = xy.mul_add(twice_slope, p1.mul_add(x, p2 * y));
     let two = simd.splat(2.0);
-    let mut bent = Bent {
+    let mut distorted = DistortedPoint {
         x: x.mul_add(radial, p1.mul_add(xy, half_p2 * two.mul_add(xx, s))),
         y: y.mul_add(radial, p2.mul_add(xy, half_p1 * two.mul_add(yy, s))),
         along_x: xx.mul_add(twice_slope, p1.mul_add(y, simd.splat(6.0 * p[7]).mul_add(x, radial))),
@@ -108,16 +108,16 @@ pub(crate) fn bend<S: Simd, const RATIONAL: bool, const PRISM: bool>(
     };
     if PRISM {
         let (s1, s2, s3, s4) = (p[12], p[13], p[14], p[15]);
-        bent.x = simd.splat(s2).mul_add(s, simd.splat(s1)).mul_add(s, bent.x);
-        bent.y = simd.splat(s4).mul_add(s, simd.splat(s3)).mul_add(s, bent.y);
+        distorted.x = simd.splat(s2).mul_add(s, simd.splat(s1)).mul_add(s, distorted.x);
+        distorted.y = simd.splat(s4).mul_add(s, simd.splat(s3)).mul_add(s, distorted.y);
         let along_x = simd.splat(4.0 * s2).mul_add(s, simd.splat(2.0 * s1));
         let along_y = simd.splat(4.0 * s4).mul_add(s, simd.splat(2.0 * s3));
-        bent.along_x = along_x.mul_add(x, bent.along_x);
-        bent.cross_x = along_x.mul_add(y, bent.cross_x);
-        bent.cross_y = along_y.mul_add(x, bent.cross_y);
-        bent.along_y = along_y.mul_add(y, bent.along_y);
+        distorted.along_x = along_x.mul_add(x, distorted.along_x);
+        distorted.cross_x = along_x.mul_add(y, distorted.cross_x);
+        distorted.cross_y = along_y.mul_add(x, distorted.cross_y);
+        distorted.along_y = along_y.mul_add(y, distorted.along_y);
     }
-    bent
+    distorted
 }
 
 /// `1 + c1 s + c2 s^2 + c3 s^3` and twice its derivative.

@@ -14,7 +14,7 @@ mod transform;
 use crate::simd::{Simd, Vector};
 
 pub(crate) use factor::{factorise, log_pivots};
-pub(crate) use lens::{Bent, Window, bend};
+pub(crate) use lens::{DistortedPoint, Window, distort};
 pub(crate) use moments::Sums;
 pub(crate) use plane_moments::PlaneMoments;
 pub(crate) use symmetric::{UPPER, triangle, upper};

@@ -5,7 +5,7 @@
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 #![expect(clippy::needless_range_loop, reason = "indices of matrices: several are read at the same place")]
 
-mod look;
+mod linearise;
 mod measurements;
 mod normal;
 mod step;
@@ -14,10 +14,10 @@ mod tests;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 
-use self::look::{Look, Optics, Sight};
+use self::linearise::{Linearise, LinearisedGroup, Optics};
 pub(super) use self::measurements::Measurements;
 use self::measurements::Row;
-pub(super) use self::normal::Desk;
+pub(super) use self::normal::Workspace;
 pub(crate) use self::normal::through_chain;
 use self::normal::{Correct, Errors, Noise, Normal, correction, lane, set_lane};
 use self::step::{Equations, Step, Vector12};
@@ -27,8 +27,8 @@ use super::model::{Model, Side};
 use super::problem::Problem;
 use super::report::{Ending, Solution, ViewReport};
 use super::solver::{Options, Start};
+use crate::batched_algebra::entries;
 use crate::camera::Lens;
-use crate::lanes::entries;
 use crate::se3::Se3;
 use crate::simd::{MAX_LANES, dispatch};
 
@@ -39,11 +39,11 @@ struct State {
     /// Motions of each group with the robot's errors, and these; none for an exact robot.
     motions: Vec<[Row; 12]>,
     errors: Vec<Errors>,
-    sights: Vec<Sight>,
+    linearised: Vec<LinearisedGroup>,
     cost: f64,
 }
 
-pub(super) struct SideBySide<'a> {
+pub(super) struct BatchedEngine<'a> {
     problem: &'a Problem,
     model: &'a Model,
     loss: Loss,
@@ -56,7 +56,7 @@ pub(super) struct SideBySide<'a> {
     trial: State,
     equations: Equations,
     step: Vector12,
-    desk: &'a mut Desk,
+    workspace: &'a mut Workspace,
 }
 
 /// Whether the engine can do it: corners, a lens of the kind that lanes know, and nothing free but `X` and `Y`.
@@ -64,7 +64,7 @@ pub(super) fn fits(problem: &Problem, model: &Model) -> bool {
     problem.camera().lens != Lens::KannalaBrandt && model.parameter_count() == 12
 }
 
-impl<'a> SideBySide<'a> {
+impl<'a> BatchedEngine<'a> {
     /// At the start; the index of the first view that cannot be seen from there otherwise.
     pub fn new(
         problem: &'a Problem,
@@ -73,7 +73,7 @@ impl<'a> SideBySide<'a> {
         views: &'a [usize],
         measurements: &'a Measurements,
         start: &Start,
-        desk: &'a mut Desk,
+        workspace: &'a mut Workspace,
     ) -> Result<Self, usize> {
         const ZERO: Row = [0.0; MAX_LANES];
         let groups = &measurements.groups;
@@ -88,7 +88,7 @@ impl<'a> SideBySide<'a> {
             y: start.y,
             motions: noisy.iter().map(|group| group.motions).collect(),
             errors: noisy.iter().map(|_| Errors::new()).collect(),
-            sights: groups.iter().map(|_| Sight::new()).collect(),
+            linearised: groups.iter().map(|_| LinearisedGroup::new()).collect(),
             cost: 0.0,
         };
         let camera = problem.camera();
@@ -104,22 +104,22 @@ impl<'a> SideBySide<'a> {
             trial: state(),
             equations: Equations::new(),
             step: Vector12::zeros(),
-            desk,
+            workspace,
         };
-        engine.look()?;
+        engine.linearise()?;
         std::mem::swap(&mut engine.current, &mut engine.trial);
         Ok(engine)
     }
 
     /// Linearises every view at the trial state; the index of the first that cannot be seen otherwise.
-    fn look(&mut self) -> Result<(), usize> {
-        self.err();
+    fn linearise(&mut self) -> Result<(), usize> {
+        self.apply_robot_errors();
         let trial = &mut self.trial;
         let (x, y) = (entries(&trial.x), entries(&trial.y));
         let alike = self.loss == Loss::Squared && self.problem.whitening(0).is_none();
-        macro_rules! look {
+        macro_rules! linearise {
             ($($flag:literal),*) => {
-                dispatch(self.desk.unit, Look::<$($flag),*> {
+                dispatch(self.workspace.unit, Linearise::<$($flag),*> {
                     x: &x,
                     y: &y,
                     motions: &trial.motions,
@@ -127,28 +127,28 @@ impl<'a> SideBySide<'a> {
                     optics: &self.optics,
                     loss: self.loss,
                     measurements: self.measurements,
-                    out: &mut trial.sights,
+                    out: &mut trial.linearised,
                 })
             };
         }
         match (self.problem.camera().lens, alike) {
-            (Lens::Pinhole | Lens::KannalaBrandt, true) => look!(false, false, true),
-            (Lens::Pinhole | Lens::KannalaBrandt, false) => look!(false, false, false),
-            (Lens::BrownConrady4 | Lens::BrownConrady5, true) => look!(true, false, true),
-            (Lens::BrownConrady4 | Lens::BrownConrady5, false) => look!(true, false, false),
-            (Lens::BrownConrady8 | Lens::BrownConrady12, true) => look!(true, true, true),
-            (Lens::BrownConrady8 | Lens::BrownConrady12, false) => look!(true, true, false),
+            (Lens::Pinhole | Lens::KannalaBrandt, true) => linearise!(false, false, true),
+            (Lens::Pinhole | Lens::KannalaBrandt, false) => linearise!(false, false, false),
+            (Lens::BrownConrady4 | Lens::BrownConrady5, true) => linearise!(true, false, true),
+            (Lens::BrownConrady4 | Lens::BrownConrady5, false) => linearise!(true, false, false),
+            (Lens::BrownConrady8 | Lens::BrownConrady12, true) => linearise!(true, true, true),
+            (Lens::BrownConrady8 | Lens::BrownConrady12, false) => linearise!(true, true, false),
         }
         let parts = self.measurements.parts;
         let mut cost = 0.0;
-        for (group, (sight, views)) in
-            trial.sights.iter().zip(self.views.chunks(MAX_LANES / parts)).enumerate()
+        for (group, (seen, views)) in
+            trial.linearised.iter().zip(self.views.chunks(MAX_LANES / parts)).enumerate()
         {
             for at in 0..views.len() * parts {
-                if sight.whole[at] == 0.0 || !sight.cost[at].is_finite() {
+                if seen.whole[at] == 0.0 || !seen.cost[at].is_finite() {
                     return Err(views[at / parts]);
                 }
-                cost += sight.cost[at];
+                cost += seen.cost[at];
                 if let Some(errors) = trial.errors.get(group) {
                     cost += correction(errors, at).norm_squared();
                 }
@@ -159,7 +159,7 @@ impl<'a> SideBySide<'a> {
     }
 
     /// Puts the robot's errors into the motions of the trial state.
-    fn err(&mut self) {
+    fn apply_robot_errors(&mut self) {
         let Some(robot) = &self.model.robot else { return };
         let groups = self.trial.motions.iter_mut().zip(&mut self.trial.errors);
         for (group, (motions, errors)) in groups.enumerate() {
@@ -191,8 +191,8 @@ impl<'a> SideBySide<'a> {
             errors: &mut self.current.errors,
             damping,
         });
-        let (unit, desk, equations) = (self.desk.unit, &mut *self.desk, &mut self.equations);
-        dispatch(unit, Normal { sights: &self.current.sights, noise, desk, equations });
+        let (unit, workspace, equations) = (self.workspace.unit, &mut *self.workspace, &mut self.equations);
+        dispatch(unit, Normal { linearised: &self.current.linearised, noise, workspace, equations });
         if let Some(prior) = &self.model.chain_prior {
             let (x, y) = (&self.current.x, &self.current.y);
             for (at, (information, gradient)) in [(0, prior.normal(true, x)), (6, prior.normal(false, y))] {
@@ -202,7 +202,7 @@ impl<'a> SideBySide<'a> {
     }
 }
 
-impl Engine for SideBySide<'_> {
+impl Engine for BatchedEngine<'_> {
     fn cost(&self) -> f64 {
         self.current.cost
     }
@@ -211,7 +211,7 @@ impl Engine for SideBySide<'_> {
         self.assemble(damping);
         let equations = &self.equations;
         let damping = equations.diagonal().map(|entry| damping * entry.max(1e-12));
-        self.step = dispatch(self.desk.unit, Step { equations, damping: &damping })?;
+        self.step = dispatch(self.workspace.unit, Step { equations, damping: &damping })?;
         if !self.step.iter().all(|x| x.is_finite()) {
             return None;
         }
@@ -229,16 +229,16 @@ impl Engine for SideBySide<'_> {
         self.trial.y = Se3::exp(&xi_y) * self.current.y;
         if self.model.robot.is_some() {
             dispatch(
-                self.desk.unit,
+                self.workspace.unit,
                 Correct {
                     step: &self.step,
-                    sights: &self.current.sights,
+                    linearised: &self.current.linearised,
                     errors: &self.current.errors,
                     out: &mut self.trial.errors,
                 },
             );
         }
-        self.look().ok().map(|()| self.trial.cost)
+        self.linearise().ok().map(|()| self.trial.cost)
     }
 
     fn accept(&mut self) {
@@ -258,13 +258,13 @@ impl Engine for SideBySide<'_> {
         let parts = self.measurements.parts;
         let views = self.views.iter().enumerate().map(|(i, k)| {
             let (group, at) = (i * parts / MAX_LANES, i * parts % MAX_LANES);
-            let sum = |row: fn(&Sight) -> &Row| -> f64 {
+            let sum = |row: fn(&LinearisedGroup) -> &Row| -> f64 {
                 (i * parts..(i + 1) * parts)
-                    .map(|lane| row(&self.current.sights[lane / MAX_LANES])[lane % MAX_LANES])
+                    .map(|lane| row(&self.current.linearised[lane / MAX_LANES])[lane % MAX_LANES])
                     .sum()
             };
-            let sight = &self.current.sights[group];
-            let pose = lane(&sight.pose, at);
+            let seen = &self.current.linearised[group];
+            let pose = lane(&seen.pose, at);
             let (mut twist, mut correction_cost) = (Vector6::zeros(), 0.0);
             if let Some(robot) = &self.model.robot {
                 let errors = &self.current.errors[group];
@@ -275,8 +275,8 @@ impl Engine for SideBySide<'_> {
             }
             ViewReport {
                 view: *k,
-                rmse_px: (sum(|sight| &sight.squared_px) / self.problem.point_count(*k) as f64).sqrt(),
-                cost: sum(|sight| &sight.cost),
+                rmse_px: (sum(|seen| &seen.squared_px) / self.problem.point_count(*k) as f64).sqrt(),
+                cost: sum(|seen| &seen.cost),
                 correction: twist,
                 correction_cost,
                 pose: Se3::new(Matrix3::from_row_slice(&pose[..9]), Vector3::from_column_slice(&pose[9..])),

@@ -2,10 +2,10 @@
 
 use nalgebra::Vector6;
 
-use super::look::Sight;
+use super::linearise::LinearisedGroup;
 use super::measurements::{Group, Row};
 use super::step::{Equations, Vector12};
-use crate::lanes::{UPPER, left_product, load, store, upper};
+use crate::batched_algebra::{UPPER, left_product, load, store, upper};
 use crate::least_squares::Side;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, ln};
 
@@ -49,15 +49,15 @@ pub(super) struct Noise<'a> {
 
 /// Sums the normal equations, the robot's errors eliminated.
 pub(super) struct Normal<'a> {
-    pub sights: &'a [Sight],
+    pub linearised: &'a [LinearisedGroup],
     pub noise: Option<Noise<'a>>,
-    pub desk: &'a mut Desk,
+    pub workspace: &'a mut Workspace,
     pub equations: &'a mut Equations,
 }
 
 /// A vector unit and room for its sums: blocks of the information and of the gradient, each entry by lanes.
 #[repr(C, align(64))]
-pub(in crate::least_squares) struct Desk {
+pub(in crate::least_squares) struct Workspace {
     xx: [Row; UPPER],
     yy: [Row; UPPER],
     xy: [Row; 36],
@@ -66,7 +66,7 @@ pub(in crate::least_squares) struct Desk {
     pub unit: VectorUnit,
 }
 
-impl Desk {
+impl Workspace {
     pub fn new(unit: VectorUnit) -> Self {
         const ZERO: Row = [0.0; MAX_LANES];
         Self { xx: [ZERO; UPPER], yy: [ZERO; UPPER], xy: [ZERO; 36], x: [ZERO; 6], y: [ZERO; 6], unit }
@@ -78,18 +78,18 @@ impl Kernel for Normal<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) {
-        for (g, sight) in self.sights.iter().enumerate() {
+        for (g, seen) in self.linearised.iter().enumerate() {
             for at in (0..MAX_LANES).step_by(S::LANES) {
-                let mut information = load(simd, &sight.information, at);
-                let mut gradient = load(simd, &sight.gradient, at);
+                let mut information = load(simd, &seen.information, at);
+                let mut gradient = load(simd, &seen.gradient, at);
                 if let Some(noise) = &mut self.noise {
                     eliminate(simd, noise, g, at, &mut information, &mut gradient);
                 }
-                let c = load(simd, &sight.before_y, at);
-                add(simd, self.desk, g == 0 && at == 0, &information, &gradient, &c);
+                let c = load(simd, &seen.before_y, at);
+                add(simd, self.workspace, g == 0 && at == 0, &information, &gradient, &c);
             }
         }
-        total(simd, self.desk, self.equations);
+        total(simd, self.workspace, self.equations);
     }
 }
 
@@ -163,20 +163,20 @@ pub(crate) fn through_chain<V: Vector>(m: &[V; UPPER], g: &[V; 6], c: &[V; 12]) 
 #[inline(always)]
 fn add<S: Simd>(
     simd: S,
-    desk: &mut Desk,
+    workspace: &mut Workspace,
     first: bool,
     m: &[S::Vector; UPPER],
     g: &[S::Vector; 6],
     c: &[S::Vector; 12],
 ) {
     let through = through_chain(m, g, c);
-    put(simd, &mut desk.xx, first, m);
-    for (rows, product) in desk.xy.chunks_exact_mut(6).zip(&through.xy) {
+    put(simd, &mut workspace.xx, first, m);
+    for (rows, product) in workspace.xy.chunks_exact_mut(6).zip(&through.xy) {
         put(simd, rows, first, product);
     }
-    put(simd, &mut desk.yy, first, &through.yy);
-    put(simd, &mut desk.x, first, g);
-    put(simd, &mut desk.y, first, &through.y);
+    put(simd, &mut workspace.yy, first, &through.yy);
+    put(simd, &mut workspace.x, first, g);
+    put(simd, &mut workspace.y, first, &through.y);
 }
 
 /// Adds to sums; to nothing at the `first`.
@@ -190,17 +190,17 @@ fn put<S: Simd>(simd: S, rows: &mut [Row], first: bool, values: &[S::Vector]) {
 
 /// The sums over the lanes.
 #[inline(always)]
-fn total<S: Simd>(simd: S, desk: &Desk, equations: &mut Equations) {
+fn total<S: Simd>(simd: S, workspace: &Workspace, equations: &mut Equations) {
     for i in 0..6 {
         for j in i..6 {
-            equations.set(i, j, simd.load(&desk.xx[upper(i, j)]).sum());
-            equations.set(6 + i, 6 + j, simd.load(&desk.yy[upper(i, j)]).sum());
+            equations.set(i, j, simd.load(&workspace.xx[upper(i, j)]).sum());
+            equations.set(6 + i, 6 + j, simd.load(&workspace.yy[upper(i, j)]).sum());
         }
         for j in 0..6 {
-            equations.set(i, 6 + j, simd.load(&desk.xy[6 * i + j]).sum());
+            equations.set(i, 6 + j, simd.load(&workspace.xy[6 * i + j]).sum());
         }
-        equations.set_gradient(i, simd.load(&desk.x[i]).sum());
-        equations.set_gradient(6 + i, simd.load(&desk.y[i]).sum());
+        equations.set_gradient(i, simd.load(&workspace.x[i]).sum());
+        equations.set_gradient(6 + i, simd.load(&workspace.y[i]).sum());
     }
 }
 
@@ -343,7 +343,7 @@ fn to_error<S: Simd>(
 /// The corrections after a step: `w - offset - slope (xi_x + C xi_y)`.
 pub(super) struct Correct<'a> {
     pub step: &'a Vector12,
-    pub sights: &'a [Sight],
+    pub linearised: &'a [LinearisedGroup],
     pub errors: &'a [Errors],
     pub out: &'a mut [Errors],
 }
@@ -353,9 +353,9 @@ impl Kernel for Correct<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        for ((sight, errors), out) in self.sights.iter().zip(self.errors).zip(self.out) {
+        for ((seen, errors), out) in self.linearised.iter().zip(self.errors).zip(self.out) {
             for at in (0..MAX_LANES).step_by(S::LANES) {
-                let c = load(simd, &sight.before_y, at);
+                let c = load(simd, &seen.before_y, at);
                 let mut eta = [simd.splat(0.0); 6];
                 for i in 0..3 {
                     for k in 0..3 {

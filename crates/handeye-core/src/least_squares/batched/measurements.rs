@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::normal::set_lane;
-use crate::lanes::entries;
+use crate::batched_algebra::entries;
 use crate::least_squares::Problem;
 use crate::simd::MAX_LANES;
 
