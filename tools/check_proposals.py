@@ -28,7 +28,7 @@ import numpy as np
 
 from handeye.planning.collisions import Workspace
 from handeye.planning.feasibility import Generator
-from handeye.planning.sieve import ViewLimits, mounted_points
+from handeye.planning.constraints import ViewLimits, mounted_points
 from handeye.session.configuration import Configuration, Prepared, Simulation, begin, prepare
 from handeye.session.deciding import Step
 from handeye.session.entry import Failure

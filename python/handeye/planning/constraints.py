@@ -54,7 +54,7 @@ class ViewLimits:
 
 
 @dataclass(frozen=True, eq=False)
-class Sieve:
+class ViewConstraints:
     """Everything that a posture must pass, by what is believed now.
 
     Parameters
@@ -86,7 +86,7 @@ class Sieve:
         """The arm."""
         return self.body.arm
 
-    def sift(self, joints: FloatArray) -> tuple[IndexArray, Counter[str]]:
+    def passing(self, joints: FloatArray) -> tuple[IndexArray, Counter[str]]:
         """Return which of postures (N, n) pass, in their order, and for which first reason others do not."""
         left = np.arange(len(joints))
         turned_down: Counter[str] = Counter()

@@ -11,7 +11,7 @@ from handeye.planning import Planner, PlannerOptions, Stop, StopReason
 from handeye.planning.collisions import Body, Workspace
 from handeye.planning.feasibility import Generator
 from handeye.planning.refinement import offered, refine
-from handeye.planning.sieve import ViewLimits
+from handeye.planning.constraints import ViewLimits
 from handeye.planning.solids import SolidLinks
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics
@@ -160,7 +160,7 @@ class ArmChooser:
                 answer = planner.ask()
         while not isinstance(answer, Stop):
             name = answer.candidate.name
-            why = drawn.sieve.body.obstacle_on_path(standing, joints_of[name])
+            why = drawn.constraints.body.obstacle_on_path(standing, joints_of[name])
             if why is None:
                 more: dict[str, Any] = {"turned_down": turned_down, "margin_px": drawn.sight.margin_px}
                 if name in climbed:
