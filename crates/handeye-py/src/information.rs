@@ -271,11 +271,7 @@ impl Predictor {
         let robot = robot(py, robot_side, robot_root.as_ref())?;
         let free = free_camera.unwrap_or_default();
         let count = free.len() + usize::from(board_scale);
-        let pixel_parameters = (count > 0).then(|| PixelParameters {
-            camera: free,
-            board_scale,
-            prior_information: DMatrix::zeros(count, count),
-        });
+        let pixel_parameters = (count > 0).then_some(PixelParameters { camera: free, board_scale });
         Ok(Self {
             camera: camera(py, lens, &parameters)?,
             x: convert::transform(py, "x", &x)?,

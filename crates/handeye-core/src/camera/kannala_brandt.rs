@@ -4,12 +4,9 @@
 //! lenses", PAMI 28(8), 2006, eq. 6. With `r = sqrt(x^2 + y^2)` and `theta = atan r`:
 //! `(x', y') = (x, y) theta_d / r`, `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`.
 
-use nalgebra::Matrix2;
-
+use super::distortion::DistortedPoint;
+use super::lens::{ParameterJacobian, Parameters};
 use super::region::{self, MAX_SQUARED_RADIUS};
-use super::{DistortedPoint, MAX_PARAMETERS, ParameterJacobian};
-
-type Parameters = [f64; MAX_PARAMETERS];
 
 /// Below this squared radius the quotients in `r` are replaced by their series.
 const SMALL: f64 = 1e-8;
@@ -26,7 +23,7 @@ fn distorted_angle(p: &Parameters, theta: f64) -> (f64, f64) {
 }
 
 #[inline]
-pub(super) fn distort(p: &Parameters, x: f64, y: f64) -> DistortedPoint {
+pub(super) fn distort(p: &Parameters, x: f64, y: f64) -> DistortedPoint<f64> {
     let s = x * x + y * y;
     let (scale, slope) = if s < SMALL {
         let second = p[4] - 1.0 / 3.0;
@@ -41,7 +38,13 @@ pub(super) fn distort(p: &Parameters, x: f64, y: f64) -> DistortedPoint {
     DistortedPoint {
         x: x * scale,
         y: y * scale,
-        jacobian: Matrix2::new(scale + slope * x * x, cross, cross, scale + slope * y * y),
+        along_x: scale + slope * x * x,
+        cross_x: cross,
+        cross_y: cross,
+        along_y: scale + slope * y * y,
+        squared_radius: s,
+        radial: scale,
+        inverse_denominator: 1.0,
     }
 }
 

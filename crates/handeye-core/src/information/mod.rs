@@ -6,6 +6,7 @@
 mod belief;
 mod candidate;
 pub mod criteria;
+mod gains;
 mod scorer;
 
 pub use belief::{Belief, entropy};

@@ -5,7 +5,9 @@
 
 use super::block::{BLOCK, Block};
 use super::target::{Target, Way, advance};
-use crate::batched_algebra::{UPPER, Window, distort, load, store, upper};
+use super::window::Window;
+use crate::batched_algebra::{UPPER, load, store, upper};
+use crate::camera::distort;
 use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
 use crate::simd::{Kernel, Simd, Vector};
 
@@ -57,7 +59,7 @@ fn sum<S: Simd, const RATIONAL: bool, const PRISM: bool>(
                 let w = one / depth;
                 let (x, y) = (point[0] * w, point[1] * w);
                 let distorted = distort::<S, RATIONAL, PRISM>(simd, parameters, x, y);
-                let in_sight = distorted.in_sight(simd, window) & depth.greater(simd.splat(MIN_DEPTH_M));
+                let in_sight = window.shows(simd, &distorted) & depth.greater(simd.splat(MIN_DEPTH_M));
                 seen = seen + one.keep(in_sight);
                 let (w, x, y) = (w.keep(in_sight), x.keep(in_sight), y.keep(in_sight));
                 let aspect = simd.splat(parameters[1] / parameters[0]);

@@ -18,6 +18,7 @@ mod target;
 mod tests;
 mod wide_algebra;
 mod wide_points;
+mod window;
 
 use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3};
 
@@ -30,14 +31,16 @@ use self::pinhole::Pinhole;
 use self::target::Target;
 use self::wide_algebra::{Outcome, Wide};
 use self::wide_points::{Column, WidePoints};
+use self::window::Window;
 use super::belief::Belief;
 use super::candidate::{CandidateModel, Execution, Motions, Sums};
 use super::criteria::{Gain, Quantity};
-use crate::batched_algebra::{UPPER, Window, entries, upper};
+use crate::batched_algebra::{UPPER, upper};
 use crate::camera::{Camera, Lens};
 use crate::error::Error;
 use crate::least_squares::{PixelParameters, Side};
 use crate::se3::Se3;
+use crate::se3::entries;
 use crate::simd::{VectorUnit, dispatch};
 
 /// Everything about a call that does not change from candidate to candidate.

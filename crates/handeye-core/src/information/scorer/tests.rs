@@ -253,10 +253,9 @@ proptest! {
         };
         let camera: Vec<usize> = (0..lens.parameter_count()).filter(|i| free[*i]).collect();
         let count = camera.len() + usize::from(board_scale);
-        scene.pixel_parameters = (count > 0).then(|| PixelParameters {
+        scene.pixel_parameters = (count > 0).then_some(PixelParameters {
             camera,
             board_scale,
-            prior_information: DMatrix::zeros(count, count),
         });
         scene.kinematic_count = kinematic_count;
         scene.visibility.fewest = 8;
@@ -277,8 +276,7 @@ fn moments_of_a_plane_serve_the_camera_too() {
         let random = &mut Random::new(20 + seed as u64);
         let mut scene = Scene::new(random, Lens::Pinhole, 90, seed % 2 == 1, 0.0);
         scene.robot = (seed > 1).then(|| (Side::Right, robot_root(random)));
-        let prior_information = DMatrix::zeros(camera.len(), camera.len());
-        scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false, prior_information });
+        scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false });
         scene.belief = scene.start();
         scene.visibility.fewest = 8;
         scene.keep_distance();
@@ -295,9 +293,8 @@ fn boards_are_seen_from_the_side_too() {
         let random = &mut Random::new(31);
         let mut scene = Scene::new(random, Lens::Pinhole, 0, false, 0.0);
         if pixel {
-            let prior_information = DMatrix::zeros(2, 2);
             let camera = vec![0, 2];
-            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false, prior_information });
+            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false });
             scene.belief = scene.start();
         }
         for round in 0..60 {
@@ -319,10 +316,9 @@ fn a_mean_over_suppositions_is_the_mean_of_each() {
     for lens in [Lens::Pinhole, Lens::BrownConrady5, Lens::KannalaBrandt] {
         let random = &mut Random::new(30);
         let mut scene = Scene::new(random, lens, 70, false, 0.0);
-        let prior_information = DMatrix::zeros(3, 3);
         let camera = vec![0, 2, 4];
         if lens != Lens::Pinhole {
-            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false, prior_information });
+            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false });
             scene.belief = scene.start();
         }
         let wider = Belief::new(scene.belief.information() * 0.5).unwrap();

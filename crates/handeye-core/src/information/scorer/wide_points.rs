@@ -3,8 +3,9 @@
 use super::block::{BLOCK, Block};
 use super::forms::packed;
 use super::target::{Patch, Target};
-use crate::batched_algebra::{DistortedPoint, Window, distort, load};
-use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
+use super::window::Window;
+use crate::batched_algebra::load;
+use crate::camera::{DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, coefficient_derivative, distort};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// Points whose rows of `d pi / d [eta; c]` are squared together: a sum is fetched once for all of them.
@@ -70,7 +71,7 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool> Kernel
             let mut filled = 0;
             for (y, z, along) in self.target.patches.iter().flat_map(Patch::lines) {
                 for x in along {
-                    seen = seen + self.look::<S>(simd, &pose, [x, y, z], &mut rows, filled);
+                    seen = seen + self.point_rows::<S>(simd, &pose, [x, y, z], &mut rows, filled);
                     filled += 1;
                     if filled == TOGETHER {
                         add_squares(simd, &rows[..size], &moves, &mut self.block.information, at);
@@ -98,7 +99,7 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
 {
     /// Writes the two rows of a point, zero where it is not in sight; one where it is.
     #[inline(always)]
-    fn look<S: Simd>(
+    fn point_rows<S: Simd>(
         &self,
         simd: S,
         pose: &[S::Vector; 12],
@@ -123,7 +124,7 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
         } else {
             DistortedPoint::unchanged(simd, x, y)
         };
-        let in_sight = distorted.in_sight(simd, self.window) & depth.greater(simd.splat(MIN_DEPTH_M));
+        let in_sight = self.window.shows(simd, &distorted) & depth.greater(simd.splat(MIN_DEPTH_M));
         let (w, x, y) = (w.keep(in_sight), x.keep(in_sight), y.keep(in_sight));
         let aspect = simd.splat(p[1] / p[0]);
         let jacobian = [
@@ -156,7 +157,7 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
                 Column::Camera(2) => (inverse_focal, zero),
                 Column::Camera(3) => (zero, inverse_focal),
                 Column::Camera(i) => {
-                    let (u, v) = coefficient(simd, *i, x, y, &distorted);
+                    let (u, v) = coefficient_derivative(simd, *i, x, y, &distorted);
                     (u, v * aspect)
                 }
             };
@@ -165,35 +166,6 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
         }
         one.keep(in_sight)
     }
-}
-
-/// Derivative of a point after the lens in a distortion coefficient, as `camera::brown_conrady::coefficients`.
-#[inline(always)]
-fn coefficient<S: Simd>(
-    simd: S,
-    parameter: usize,
-    x: S::Vector,
-    y: S::Vector,
-    distorted: &DistortedPoint<S::Vector>,
-) -> (S::Vector, S::Vector) {
-    let zero = simd.splat(0.0);
-    let two = simd.splat(2.0);
-    let s = distorted.squared_radius;
-    let radial = match parameter {
-        4 => distorted.inverse_denominator * s,
-        5 => distorted.inverse_denominator * s * s,
-        8 => distorted.inverse_denominator * s * s * s,
-        9 => -(distorted.radial * distorted.inverse_denominator * s),
-        10 => -(distorted.radial * distorted.inverse_denominator * s * s),
-        11 => -(distorted.radial * distorted.inverse_denominator * s * s * s),
-        6 => return (two * x * y, (two * y).mul_add(y, s)),
-        7 => return ((two * x).mul_add(x, s), two * x * y),
-        12 => return (s, zero),
-        13 => return (s * s, zero),
-        14 => return (zero, s),
-        _ => return (zero, s * s),
-    };
-    (x * radial, y * radial)
 }
 
 /// Adds the squares of the rows to the information; what moves no point along an axis has no product there.
