@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from handeye.planning import Planner, PlannerOptions, Proposal, make_policy
+from handeye.planning.constraints import ViewLimits
 from handeye.planning.feasibility import FeasiblePool, Generator
 from handeye.planning.refinement import Refined, Refinement, offered, refine
-from handeye.planning.constraints import ViewLimits
 from handeye.planning.travel import Travel
 from handeye.robots import ArmKinematics
 from handeye.session.configuration import Prepared, begin, prepare

@@ -90,7 +90,7 @@ class ViewConstraints:
         """Return which of postures (N, n) pass, in their order, and for which first reason others do not."""
         left = np.arange(len(joints))
         turned_down: Counter[str] = Counter()
-        # Each is asked only of what the ones before it let through; the dear ones come last.
+        # Each is asked only of what the ones before it let through; the costly ones come last.
         for reasons in (self._bad_views, self._hidden, self.body.obstacles, self._failed_before):
             why = reasons(joints[left])
             turned_down.update(reason for reason in why if reason is not None)

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from handeye import _core
 from handeye.planning.candidates import Candidate
+from handeye.planning.constraints import ViewConstraints
 from handeye.planning.feasibility import FeasiblePool, candidates_at
 from handeye.planning.planner import PlannerOptions
 from handeye.planning.policies import Policy
-from handeye.planning.constraints import ViewConstraints
 from handeye.planning.travel import Travel
 from handeye.robots import Arm
 from handeye.solving.estimate import Estimate
@@ -79,8 +79,8 @@ def refine(
 ) -> list[Refined]:
     """Climb from the best candidates; return where it ended, as far as it led anywhere.
 
-    Every posture on the way passes the constraints of the pool and is reached on a free straight path from where
-    the arm stands. The climb looks at the likeliest hypothesis about the robot's noise only, so what it
+    Every posture on the way passes the constraints of the pool and is reached on a free straight path from
+    where the arm stands. The climb looks at the likeliest hypothesis about the robot's noise only, so what it
     returns is to be scored like any candidate before it is taken.
 
     Parameters
@@ -127,8 +127,15 @@ def offered(refined: Sequence[Refined], arm: Arm) -> tuple[Candidate, ...]:
 class _Scorer:
     """Scores postures under the likeliest hypothesis, as the policy weighs them."""
 
-    def __init__(self, constraints: ViewConstraints, policy: Policy, criterion: _core.Criterion, travel: Travel) -> None:
-        self._constraints, self._policy, self._criterion, self._travel = constraints, policy, criterion, travel
+    def __init__(
+        self, constraints: ViewConstraints, policy: Policy, criterion: _core.Criterion, travel: Travel
+    ) -> None:
+        self._constraints, self._policy, self._criterion, self._travel = (
+            constraints,
+            policy,
+            criterion,
+            travel,
+        )
         estimate: Estimate = constraints.estimate
         hypothesis = estimate.averaged[0][1]
         self._belief = _core.Belief(hypothesis.information)
