@@ -19,7 +19,8 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = [
     {"planning"},
     {"information"},
-    {"estimation", "evidence"},
+    {"evidence"},
+    {"estimation"},
     {"least_squares", "planar_pose"},
     {"pose", "closed_form"},
     {"camera", "kinematics"},
