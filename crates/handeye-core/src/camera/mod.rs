@@ -11,6 +11,7 @@ mod feature;
 mod kannala_brandt;
 mod lens;
 mod observation;
+mod projection_row;
 mod region;
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
@@ -23,6 +24,7 @@ pub(crate) use distortion::DistortedPoint;
 pub use feature::Feature;
 pub use lens::{Lens, MAX_PARAMETERS, ParameterJacobian};
 pub use observation::Observation;
+pub(crate) use projection_row::{projection_row, restore_signs};
 
 /// Points nearer to the camera's plane than this, in metres, count as behind it.
 pub const MIN_DEPTH_M: f64 = 1e-6;
@@ -194,14 +196,20 @@ impl Camera {
     pub fn project_with_derivatives(&self, point: &Vector3<f64>) -> Option<Projection> {
         let (x, y, inverse_depth) = at_unit_depth(point)?;
         let distorted = self.distort(x, y)?;
-        let mut d_parameters = ParameterJacobian::zeros();
-        self.distortion_derivatives((x, y), &distorted, &mut d_parameters);
-        self.finish_parameters(distorted.x, distorted.y, &mut d_parameters);
         Some(Projection {
             pixel: self.scale_and_shift(distorted.x, distorted.y),
             d_point: self.point_derivative(x, y, inverse_depth, &distorted),
-            d_parameters,
+            d_parameters: self.parameter_derivative(x, y, &distorted),
         })
+    }
+
+    /// Derivative in the parameters of the pixel of a point at `(x, y)` in the plane at unit depth.
+    #[inline]
+    fn parameter_derivative(&self, x: f64, y: f64, distorted: &DistortedPoint<f64>) -> ParameterJacobian {
+        let mut jacobian = ParameterJacobian::zeros();
+        self.distortion_derivatives((x, y), distorted, &mut jacobian);
+        self.finish_parameters(distorted.x, distorted.y, &mut jacobian);
+        jacobian
     }
 
     #[inline]
