@@ -19,8 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = [
     {"planning"},
     {"information"},
-    {"evidence"},
-    {"estimation"},
+    {"estimation", "evidence"},
     {"least_squares", "planar_pose"},
     {"pose", "closed_form"},
     {"camera", "kinematics"},

@@ -3,8 +3,7 @@
 use nalgebra::Matrix6;
 
 use super::cell::{Cell, Measurement};
-use super::start::start_from_poses;
-use super::weak_prior::WeakPrior;
+use super::start::{WeakPrior, start_from_poses};
 use crate::error::Error;
 use crate::se3::Se3;
 
@@ -49,8 +48,9 @@ pub fn start_of_cell(
         (still, std::cmp::Reverse(of(*c, *t).len()))
     });
     loop {
-        let open =
-            |x: &[Option<Se3>], y: &[Option<Se3>], (c, t): (usize, usize)| x[c].is_none() || y[t].is_none();
+        let open = |x: &[Option<Se3>], y: &[Option<Se3>], (c, t): (usize, usize)| {
+            x[c].is_none() || y[t].is_none()
+        };
         // Of those with a known end first: their other end follows.
         let next = pairs
             .iter()

@@ -14,12 +14,41 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::component::Component;
-pub(super) use super::component::{Effect, Term};
+use super::components::Component;
 use super::levels::Level;
 use super::linearisation::Linearisation;
 use crate::positive::Factor;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
+
+/// What a component does, and the levels whose product is its deviation.
+#[derive(Clone, Debug)]
+pub(super) struct Term {
+    /// Its component's levels that are multiplied.
+    pub levels: Vec<usize>,
+    /// What it does.
+    pub effect: Effect,
+}
+
+/// What a component does at a deviation of one.
+#[derive(Clone, Debug)]
+pub(super) enum Effect {
+    /// New at every station: roots of its covariance, one per station.
+    Noise(Vec<DMatrix<f64>>),
+    /// The same at all stations: columns of new parameters, one matrix per station.
+    Constant(Vec<DMatrix<f64>>),
+    /// As `Constant`, but what all stations share of it cannot be told from the poses and comes again whenever the arm
+    /// works: the answer is given as if it were new at every station, and its covariance is as it is.
+    Recurring(Vec<DMatrix<f64>>),
+    /// A prior on parameters that are there already.
+    Prior {
+        /// First of them.
+        first: usize,
+        /// Information at a deviation of one.
+        information: DMatrix<f64>,
+        /// Mean.
+        mean: DVector<f64>,
+    },
+}
 
 /// A prior on parameters.
 struct Prior {
@@ -272,7 +301,13 @@ impl Mixed {
     }
 
     /// Adds a prior at deviation `s`; what it adds to twice the value.
-    fn add_prior(&self, p: &Prior, s: f64, information: &mut DMatrix<f64>, right: &mut DVector<f64>) -> f64 {
+    fn add_prior(
+        &self,
+        p: &Prior,
+        s: f64,
+        information: &mut DMatrix<f64>,
+        right: &mut DVector<f64>,
+    ) -> f64 {
         let weight = s.powi(-2);
         let mut constant = 2.0 * p.count as f64 * s.ln();
         match &p.information {

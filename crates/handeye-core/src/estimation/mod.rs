@@ -12,7 +12,6 @@
 
 mod cell;
 mod cell_start;
-mod component;
 mod components;
 mod descent;
 mod levels;
@@ -25,7 +24,6 @@ mod start;
 mod systems;
 pub mod tuning;
 mod twists;
-mod weak_prior;
 
 pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station};
 pub use cell_start::{CellStart, start_of_cell};
@@ -33,5 +31,4 @@ pub use components::Assumptions;
 pub use levels::{Level, LevelPrior};
 pub use pose_measurement::{PoseMeasurement, compress, shrunk_variances};
 pub use posterior::{Node, Options, Posterior, estimate};
-pub use start::{ChainStart, start_from_poses};
-pub use weak_prior::WeakPrior;
+pub use start::{ChainStart, WeakPrior, start_from_poses};

@@ -3,12 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::cell::Cell;
-use super::component::Component;
-use super::components::{self, Assumptions};
+use super::components::{self, Assumptions, Component};
 use super::linearisation::{Guess, linearise};
 use super::mixed::{Evaluation, Mixed, Wanted};
 use super::nodes;
-use super::weak_prior::WeakPrior;
+use super::start::WeakPrior;
 use crate::error::Error;
 use crate::se3::Se3;
 
@@ -194,8 +193,9 @@ fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Error> {
 fn damped_step(now: &Evaluation, damping: f64) -> DVector<f64> {
     let eigen = nalgebra::SymmetricEigen::new(now.curvature.clone());
     let along = eigen.eigenvectors.tr_mul(&now.slope);
-    let scaled =
-        DVector::from_fn(along.len(), |i, _| -along[i] / (eigen.eigenvalues[i].abs().max(0.05) + damping));
+    let scaled = DVector::from_fn(along.len(), |i, _| {
+        -along[i] / (eigen.eigenvalues[i].abs().max(0.05) + damping)
+    });
     let mut step = &eigen.eigenvectors * scaled;
     let longest = step.amax();
     if longest > LONGEST_STEP {
