@@ -8,7 +8,7 @@ use nalgebra::{Matrix2x6, Vector2};
 
 use super::circle::{BOUNDARY, Boundary, CIRCLE, Ellipse};
 use super::feature::Feature;
-use super::{Camera, DistortedPoint, Lens, ParameterJacobian, at_unit_depth, projection_row};
+use super::{Camera, Lens, ParameterJacobian, at_unit_depth};
 use crate::se3::Se3;
 
 /// What a camera sees of a feature, with derivatives.
@@ -65,21 +65,6 @@ impl Camera {
         let (pixel, d_twist) =
             self.observe_circle_with_derivatives(t_camera_target, feature, Some(&mut d_parameters))?;
         Some(Observation { pixel, d_twist, d_parameters })
-    }
-
-    /// Derivative in the twist of the pixel of a point that lies at `(x, y)` in the plane at unit depth.
-    #[inline]
-    fn twist_derivative(
-        &self,
-        x: f64,
-        y: f64,
-        inverse_depth: f64,
-        lens: &DistortedPoint<f64>,
-    ) -> Matrix2x6<f64> {
-        let (fx, fy) = (self.parameters[0], self.parameters[1]);
-        let rows = [(fx * lens.along_x, fx * lens.cross_x), (fy * lens.cross_y, fy * lens.along_y)];
-        let [u, v] = rows.map(|of_lens| projection_row(of_lens, inverse_depth, x, y));
-        Matrix2x6::new(u[0], u[1], -u[2], -u[3], u[4], u[5], v[0], v[1], -v[2], -v[3], v[4], v[5])
     }
 
     fn observe_circle(&self, t_camera_target: &Se3, feature: &Feature) -> Option<Vector2<f64>> {

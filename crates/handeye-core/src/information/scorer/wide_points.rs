@@ -5,7 +5,9 @@ use super::forms::packed;
 use super::target::{Patch, Target};
 use super::window::Window;
 use crate::batched_algebra::load;
-use crate::camera::{DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, coefficient_derivative, distort, projection_row};
+use crate::camera::{
+    DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, coefficient_derivative, distort, projection_row,
+};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// Points whose rows of `d pi / d [eta; c]` are squared together: a sum is fetched once for all of them.
