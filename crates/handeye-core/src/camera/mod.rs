@@ -46,7 +46,7 @@ pub struct Projection {
 /// A camera: a lens and its parameters `fx, fy, cx, cy, distortion...`, validated.
 ///
 /// The fields are for reading; make a changed camera with [`Camera::new`] or [`Camera::plus`], which also find
-/// out again where the lens is valid.
+/// the region where the lens is valid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Which lens.

@@ -6,7 +6,7 @@ use crate::least_squares::measurements::{Group, Measurements, Point, Row};
 use crate::se3::{left_product, right_product};
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector};
 
-/// What a group of views is found to be at one state.
+/// A group of views linearised at one state.
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct LinearisedGroup {
@@ -34,7 +34,7 @@ impl LinearisedGroup {
     }
 }
 
-/// The camera as the kernels want it.
+/// Camera parameters for the kernels.
 pub(super) struct Optics {
     pub parameters: [f64; MAX_PARAMETERS],
     pub max_squared_radius: f64,
