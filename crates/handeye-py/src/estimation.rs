@@ -57,7 +57,6 @@ impl PoseMeasurements {
         }
         let columns = free.len() + usize::from(board_scale);
         let parameters = (columns > 0).then(|| PixelParameters {
-            prior_information: DMatrix::zeros(columns, columns),
             camera: free,
             board_scale,
         });
