@@ -154,7 +154,7 @@ def from_neighbours(plane: FloatArray, pixels: FloatArray) -> FloatArray:
         return pixels.copy()
     away = np.linalg.norm(plane[:, np.newaxis] - plane, axis=2)
     np.fill_diagonal(away, np.inf)
-    around = np.argsort(away, axis=1)[:, :NEIGHBOURS]
+    around = np.argpartition(away, min(NEIGHBOURS, len(plane) - 1), axis=1)[:, :NEIGHBOURS]
     # Coordinates about each corner, of size one; then the corner itself is at the origin of the plane.
     x, _ = _about(plane[around], plane)
     u, extent = _about(pixels[around], pixels)

@@ -5,6 +5,7 @@ pub mod corner;
 mod corner_equations;
 mod corner_window;
 mod correlation;
+pub mod neighbours;
 pub mod plane_map;
 pub mod printed;
 mod raster;
