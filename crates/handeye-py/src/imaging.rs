@@ -1,10 +1,10 @@
 //! Measuring in pictures.
 
 use handeye_core::error::Error;
-use handeye_core::picture::Picture;
-use handeye_core::picture::corner::{Corner, CornerFitter, CornerGuess, CornerKind};
-use handeye_core::picture::neighbours::{Crossing, neighbours};
-use handeye_core::picture::spot::{Spot, area_centroid, free_gaps as core_free_gaps};
+use handeye_core::imaging::Picture;
+use handeye_core::imaging::corner::{Corner, CornerFitter, CornerGuess, CornerKind};
+use handeye_core::imaging::neighbours::{Crossing, neighbours};
+use handeye_core::imaging::spot::{Spot, area_centroid, free_gaps as core_free_gaps};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
