@@ -25,7 +25,7 @@ _FLAGS = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTAT
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
-    """Return the grey values (H, W) of a PNG, JPEG, BMP or TIFF file.
+    """Return the grey values (H, W) of an image: PNG, JPEG, BMP, TIFF, PGM, WebP and what else OpenCV reads.
 
     Colour becomes grey. 10, 12 and 14 bits kept in 16 are told by the brightest pixel and scaled to 8 by the
     same power of two. An orientation noted in the file is ignored: pixels are those of the sensor.

@@ -24,8 +24,8 @@ from handeye.types.arrays import FloatArray
 
 # The search begins in a picture of about this size and goes on in ones twice as large, up to the image.
 COARSEST_SIDE_PX, SMALLEST_SIDE_PX = 500, 24
-# A third of a board's corners, or so many, must be joined before it is grown.
-LARGE_CORE = 12
+# A third of a board's corners, or so many, must be joined before it is grown; of a board of any size so many.
+LARGE_CORE, FEWEST_CORE = 12, 6
 # Part of a square's height that the window of a corner may take.
 WINDOW_SHARE = 0.8
 # Fewer lines of corners may be any pattern.
@@ -46,19 +46,18 @@ def find(image: Image, target: Chessboard) -> Detection | NotFound:
     Point 0 is chosen so that the square between the first corners of the first two rows is dark, if the board
     can be turned so: the board stands as it is usually drawn, with a dark square at the upper left.
     """
-    other: NotFound | None = None
+    spoilt: NotFound | None = None
     core = max(FEWEST, min(target.point_count // 3, LARGE_CORE))
     for part in _parts(image):
         for mesh in meshes(part.picture, find_saddles(part.picture), core):
             laid = _laid(target, mesh)
             if laid is None:
-                other = other or _of_another_size(part, target, mesh)
                 continue
             found = _measured(image, target, _labeled(image, target, part.places(laid)))
             if isinstance(found, Detection):
                 return found
-            other = other or found
-    return other or diagnose(
+            spoilt = spoilt or found
+    return spoilt or diagnose(
         image,
         NotFound(Reason.NO_PATTERN, f"no chessboard with {target.columns} x {target.rows} inner corners"),
     )
@@ -89,19 +88,13 @@ def _is_certain(there: NDArray[np.bool_]) -> bool:
     return bool(there.mean() >= LEAST_SHARE and all(line.mean() >= LEAST_LINE_SHARE for line in lines))
 
 
-def _of_another_size(part: Part, target: Chessboard, mesh: Mesh) -> NotFound | None:
-    """Return word of a board of another size, None where it may be one that is hidden in part."""
-    rows, columns = mesh.there.shape
-    if min(rows, columns) < FEWEST_LINES or not _is_certain(mesh.there):
-        return None
-    wanted = f"{target.columns} x {target.rows}"
-    seen = sorted((rows, columns)), sorted((target.rows, target.columns))
-    if all(a <= b for a, b in zip(*seen, strict=True)) and not _is_whole(part, mesh):
-        return NotFound(Reason.INCOMPLETE, f"only {columns} x {rows} of {wanted} inner corners are visible")
-    return NotFound(
-        Reason.WRONG_SIZE,
-        f"a chessboard with {columns} x {rows} inner corners is visible, expected {wanted}",
-    )
+def sizes(image: Image) -> Iterator[tuple[int, int]]:
+    """Yield rows and columns of corners of the chessboards that an image shows whole."""
+    for part in _parts(image):
+        for mesh in meshes(part.picture, find_saddles(part.picture), FEWEST_CORE):
+            rows, columns = mesh.there.shape
+            if min(rows, columns) >= FEWEST_LINES and _is_certain(mesh.there) and _is_whole(part, mesh):
+                yield rows, columns
 
 
 def _is_whole(part: Part, mesh: Mesh) -> bool:

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 
-from handeye.detection import tags
+from handeye.detection import chessboard, tags
 from handeye.detection.base import Detection, Image, NotFound, Reason, upright
 from handeye.detection.blobs import find_spots
 from handeye.detection.lattice import grow
@@ -25,9 +25,8 @@ SEARCH_SIDE_PX = 1000
 FEWEST_MARKERS = 4
 # Share of the circles of a grid that must be there, the fewest that are a grid, and the most.
 FILLED, FEWEST_CIRCLES, MOST_CIRCLES = 0.9, 9, 10_000
-# Corners of outlines are as far off as this.
-NEAR_PX = 5
-_ENOUGH = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 20, 0.05)
+# What lengths are taken from where no board is described.
+UNKNOWN = Chessboard(7, 10, 0.02)
 # What a picture says for itself, whatever the board.
 _OF_THE_PICTURE = (Reason.UNDEREXPOSED, Reason.OVEREXPOSED, Reason.LOW_CONTRAST, Reason.BLURRED)
 
@@ -54,48 +53,47 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
         return missing
     if shown != target:
         reason = Reason.WRONG_SIZE if _is_size_only(target, shown) else Reason.OTHER_BOARD
-        evidence = f"the picture shows another board: {shown.caption}{_difference(target, shown)}"
+        named = shown.caption if type(shown) is type(target) else without_lengths(shown)
+        evidence = f"the picture shows another board: {named}{_difference(target, shown)}"
         return NotFound(reason, evidence, shown, _advice(target, shown))
     if isinstance(target, MarkerCorners) and markers is not None:
-        near = cv2.cornerSubPix(
-            image, markers.corners.reshape(-1, 1, 2).astype(np.float32), (NEAR_PX, NEAR_PX), (-1, -1), _ENOUGH
-        )
-        corners = np.asarray(near, dtype=np.float64).reshape(-1, 4, 2)
-        return tags.measured(*upright(image, target), Seen(markers.ids, corners, NO_IDS))
+        return tags.measured(*upright(image, target), Seen(markers.ids, markers.corners, NO_IDS))
     return missing
 
 
-def _visible(image: Image, target: Target) -> Iterator[tuple[Target, Reading | None]]:
+def shown_board(image: Image) -> Target | None:
+    """Return the board that an image shows, of lengths that are not known; None if it shows none."""
+    return next((board for board, _ in _visible(image, UNKNOWN, fewest_markers=1)), None)
+
+
+def _visible(
+    image: Image, target: Target, fewest_markers: int = FEWEST_MARKERS
+) -> Iterator[tuple[Target, Reading | None]]:
     """Yield boards that an image shows, those of the family described first, and their markers."""
     # Markers first: between them there are squares, too.
-    yield from _marked(image, target)
+    yield from _marked(image, target, 1 if isinstance(target, Coded) else fewest_markers)
     without_markers = (_chessboard, _circle_grid)
     for look in without_markers[::-1] if isinstance(target, CircleGrid) else without_markers:
         for board in look(image, target):
             yield board, None
 
 
-def _marked(image: Image, target: Target) -> Iterator[tuple[Target, Reading]]:
+def _marked(image: Image, target: Target, fewest: int) -> Iterator[tuple[Target, Reading]]:
     reading = read_markers(image)
-    if reading is not None and (isinstance(target, Coded) or len(reading.ids) >= FEWEST_MARKERS):
-        height, width = image.shape
-        for lattice in lattices_of(reading):
-            if isinstance(target, Coded) or len(lattice.ids) >= FEWEST_MARKERS:
-                for board in boards_like(target, lattice, (width, height)):
-                    yield board, reading
+    if reading is None:
+        return
+    height, width = image.shape
+    for lattice in lattices_of(reading):
+        if len(lattice.ids) >= fewest:
+            for board in boards_like(target, lattice, (width, height)):
+                yield board, reading
 
 
 def _chessboard(image: Image, target: Target) -> Iterator[Chessboard]:
     """Yield the chessboard of whatever size, turned as it is described."""
-    small = Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
-    found, _, meta = cv2.findChessboardCornersSBWithMeta(
-        small, (3, 3), cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
-    )
-    if not found:
-        return
-    rows, columns = meta.shape[:2]
     pitch = target.spacing_m
-    yield _nearest(target, [Chessboard(rows, columns, pitch), Chessboard(columns, rows, pitch)])
+    for rows, columns in chessboard.sizes(image):
+        yield _nearest(target, [Chessboard(rows, columns, pitch), Chessboard(columns, rows, pitch)])
 
 
 def _circle_grid(image: Image, target: Target) -> Iterator[Target]:
@@ -180,6 +178,14 @@ def _difference(target: Target, shown: Target) -> str:
     if isinstance(shown, Charuco) and (rows - 1, columns - 1) in {described, described[::-1]}:
         return "; inner corners were counted instead of squares"
     return ""
+
+
+def without_lengths(board: Target) -> str:
+    """Return a board in words, without what a picture does not tell."""
+    fields = board.to_dict()
+    family = fields.pop("family")
+    told = [f"{name} {_toml(value)}" for name, value in fields.items() if not name.endswith("_m")]
+    return f"{family}, {', '.join(told)}"
 
 
 def _advice(target: Target, shown: Target) -> str:

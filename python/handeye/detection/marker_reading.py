@@ -1,7 +1,7 @@
 """Markers of any dictionary in an image: what is there, where the ones described are not."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -25,6 +25,9 @@ LEAST_CONTRAST = 12.0
 BORDER_ERRORS, CORRECTION = 0.06, 0.6
 # Fewer markers than these may be chance where a dictionary has so few bits.
 FEWEST, FEWEST_OF_FOUR = 1, 3
+# Corners of outlines are off by so many pixels, or this share of a side.
+NEAR_PX, NEAR_SHARE = 5, 0.08
+_ENOUGH = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 20, 0.05)
 # Windows of the thresholds, what is darker than its surroundings by so much, and how straight sides are, as a
 # share of the length around.
 WINDOWS_PX, THRESHOLD, STRAIGHT = (3, 13, 23), 7, 0.03
@@ -65,7 +68,19 @@ def read_markers(image: Image) -> Reading | None:
                 best = reading
         if best is not None and len(best.ids) >= 2 * FEWEST_OF_FOUR:
             break
-    return best
+    return None if best is None else replace(best, corners=_sharpened(image, best.corners))
+
+
+def _sharpened(image: Image, corners: FloatArray) -> FloatArray:
+    """Return corners (M, 4, 2) nearer to where edges meet: an outline is rounded, and inside of it."""
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min(axis=1)
+    sharp = np.empty_like(corners)
+    for marker, side in enumerate(sides.tolist()):
+        window = int(np.clip(NEAR_SHARE * side, 2, NEAR_PX))
+        near = corners[marker].reshape(-1, 1, 2).astype(np.float32)
+        found = cv2.cornerSubPix(image, near, (window, window), (-1, -1), _ENOUGH)
+        sharp[marker] = np.asarray(found, dtype=np.float64).reshape(4, 2)
+    return sharp
 
 
 def _readings(image: Image) -> Iterator[Reading]:

@@ -146,7 +146,11 @@ def _of_images(images: ImageSet, given: Camera | None, progress: Callable[[int, 
     ]
     recording = images.recording(camera, views)
     # What both the set and the recording made of it look at is said once.
-    warnings = {warning.code: warning for warning in (*images.warnings, *recording_warnings(recording))}
+    notes = dict.fromkeys(detection.note for detection in found.values() if detection.note)
+    differs = [DataWarning("target_differs", note) for note in notes]
+    warnings = {
+        warning.code: warning for warning in (*images.warnings, *differs, *recording_warnings(recording))
+    }
     return Opened(recording, images.folder, images.layout, origin, missed, tuple(warnings.values()))
 
 
@@ -177,11 +181,11 @@ def _detect(
             raise InputError(f"{where}: {outcome.message}", code=outcome.code, hint=outcome.hint) from outcome
         done += 1
         progress(done, total)
-        if isinstance(outcome, DetectionError) and outcome.code == Reason.WRONG_SIZE:
+        if isinstance(outcome, DetectionError) and outcome.code in {Reason.WRONG_SIZE, Reason.OTHER_BOARD}:
             wrong += 1
             if wrong == done == ENOUGH_OF_WRONG_SIZE:
                 raise DetectionError(
-                    f"the first {done} of {total} images show a target of another size; {outcome.message}",
+                    f"the first {done} of {total} images show another target; {outcome.message}",
                     code="not_detected",
                     hint=outcome.hint,
                 ) from outcome
