@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 
-from handeye.detection import tags
+from handeye.detection import chessboard, tags
 from handeye.detection.base import Detection, Image, NotFound, Reason, upright
 from handeye.detection.blobs import find_spots
 from handeye.detection.lattice import grow
@@ -91,15 +91,9 @@ def _marked(image: Image, target: Target, fewest: int) -> Iterator[tuple[Target,
 
 def _chessboard(image: Image, target: Target) -> Iterator[Chessboard]:
     """Yield the chessboard of whatever size, turned as it is described."""
-    small = Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
-    found, _, meta = cv2.findChessboardCornersSBWithMeta(
-        small, (3, 3), cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
-    )
-    if not found:
-        return
-    rows, columns = meta.shape[:2]
     pitch = target.spacing_m
-    yield _nearest(target, [Chessboard(rows, columns, pitch), Chessboard(columns, rows, pitch)])
+    for rows, columns in chessboard.sizes(image):
+        yield _nearest(target, [Chessboard(rows, columns, pitch), Chessboard(columns, rows, pitch)])
 
 
 def _circle_grid(image: Image, target: Target) -> Iterator[Target]:

@@ -22,7 +22,7 @@ CONSISTENT_SHARE = 0.75
 # Neighbours of a marker are so much further than the nearest.
 AROUND = 1.5
 NEIGHBOURS = 12
-# Corners are weighed anew so many times; those closer than this to where they should be all count the same.
+# Corners are weighed so many times; those closer than this to where they should be all count the same.
 WEIGHINGS = 5
 FINEST_PX = 0.05
 # A marker has its number where its bits agree so well with those printed; those of other numbers differ in a
@@ -183,7 +183,7 @@ def from_neighbours(plane: FloatArray, pixels: FloatArray) -> FloatArray:
         return pixels.copy()
     away = np.linalg.norm(plane[:, np.newaxis] - plane, axis=2)
     np.fill_diagonal(away, np.inf)
-    around = np.argsort(away, axis=1)[:, :NEIGHBOURS]
+    around = np.argpartition(away, min(NEIGHBOURS, len(plane) - 1), axis=1)[:, :NEIGHBOURS]
     # Coordinates about each corner, of size one; then the corner itself is at the origin of the plane.
     x, _ = _about(plane[around], plane)
     u, extent = _about(pixels[around], pixels)

@@ -1,4 +1,4 @@
-"""One door for whoever has a folder: recordings pass, images are searched for the target first."""
+"""One entry for folders: recordings pass, images are searched for the target first."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -122,7 +122,7 @@ def open_folder(
 
 
 def _nothing(done: int, total: int) -> None:
-    """Be the progress of whoever wants none."""
+    """Report no progress."""
 
 
 def _of_recording(loaded: LoadedRecording, camera: Camera | None) -> Opened:
@@ -167,12 +167,11 @@ def _detect(
         The target is in no image, or the first ones show one of another size.
     """
     total, done, wrong = len(images.shots), 0, 0
-    size = images.image_size_px or (0, 0)
+    sizes: dict[str, tuple[int, int]] = {}
 
     def read(shot: Shot) -> Image:
-        nonlocal size
         image = read_image(images.image_path(shot))
-        size = (image.shape[1], image.shape[0])
+        sizes[shot.name] = (image.shape[1], image.shape[0])
         return image
 
     def count(name: str, outcome: Detection | HandeyeError) -> None:
@@ -196,7 +195,7 @@ def _detect(
     batch = detect_all(readers, images.target, progress=count)
     batch.raise_if_none()
     missed = {name: error.message.removeprefix(f"{name}: ") for name, error in batch.failed.items()}
-    return batch.found, missed, size
+    return batch.found, missed, sizes.get(images.shots[-1].name) or images.image_size_px or (0, 0)
 
 
 def _camera(
