@@ -18,7 +18,15 @@ from handeye.detection.base import (
 from handeye.detection.corner_fit import FEW, WIDE_PX, CornerKind, astray, fit_corners, nearer, spread
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.marker_lattice import beside
-from handeye.detection.markers import LEAST_SHARE, Bits, Seen, dictionary, disagreement, parameters
+from handeye.detection.markers import (
+    LEAST_SHARE,
+    Bits,
+    Seen,
+    dictionary,
+    disagreement,
+    from_neighbours,
+    parameters,
+)
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import Charuco
 from handeye.types.arrays import FloatArray
@@ -101,6 +109,13 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         if lens is not None:
             rough = _measured(image, target, rough, lens.steps(plane, 0.1 * target.square_m))
         good = np.isfinite(rough).all(axis=1)
+        numbers, rough = numbers[good], rough[good]
+        # What lies in front of the board has edges, too: markers and corners around know better.
+        plane = np.concatenate([target.points[numbers, :2], places.reshape(-1, 2)])
+        around = np.concatenate([rough, seen.reshape(-1, 2)])
+        expected = from_neighbours(plane, around)[: len(rough)]
+        pitches = target.square_m * np.linalg.norm(_steps(rough, places, seen), axis=2).min(axis=1)
+        good = ~astray(rough, expected, pitches)
         number = int(good.sum())
         if number >= FEWEST_CORNERS:
             return ordered(target, numbers[good], rough[good])

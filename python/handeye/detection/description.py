@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from typing import Any, TypeVar
 
-import cv2
 import numpy as np
 
 from handeye.detection import chessboard, tags
@@ -12,7 +11,7 @@ from handeye.detection.blobs import find_spots
 from handeye.detection.lattice import grow
 from handeye.detection.marker_lattice import boards_like, lattices_of
 from handeye.detection.marker_reading import Reading, read_markers
-from handeye.detection.markers import NO_IDS, Seen
+from handeye.detection.markers import Seen
 from handeye.detection.part import Part
 from handeye.types import Charuco, Chessboard, CircleGrid, Target
 from handeye.types.arrays import IndexArray
@@ -46,9 +45,14 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
     missing
         Why it was not found.
     """
-    if missing.reason in _OF_THE_PICTURE:
+    if missing.reason in _OF_THE_PICTURE or missing.reason is Reason.REPEATED:
         return missing
-    shown, markers = next(_visible(image, target), (None, None))
+    if isinstance(target, Coded) and missing.reason is not Reason.NO_PATTERN:
+        # There are markers of the board: it is another with such markers, or none.
+        boards = _marked(image, target, 1)
+    else:
+        boards = _visible(image, target)
+    shown, markers = next(iter(boards), (None, None))
     if shown is None:
         return missing
     if shown != target:
@@ -57,7 +61,7 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
         evidence = f"the picture shows another board: {named}{_difference(target, shown)}"
         return NotFound(reason, evidence, shown, _advice(target, shown))
     if isinstance(target, MarkerCorners) and markers is not None:
-        return tags.measured(*upright(image, target), Seen(markers.ids, markers.corners, NO_IDS))
+        return tags.measured(*upright(image, target), Seen(markers.ids, markers.corners, markers.repeated))
     return missing
 
 
@@ -207,6 +211,8 @@ def _usual(target: Target, here: dict[str, Any]) -> dict[str, Any]:
     """Return fields of a target that a file of the board shown would leave out, as they are there."""
     gone = set(target.to_dict()) - set(here)
     usual: dict[str, Any] = {"inverted": False, "first_id": 0, "border_bits": 1}
+    if "ids" in gone and "first_id" not in here:
+        gone.add("first_id")
     return {name: value for name, value in usual.items() if name in gone}
 
 

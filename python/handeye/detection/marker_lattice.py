@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from handeye.detection.base import NotFound, Reason
 from handeye.detection.marker_reading import Reading
-from handeye.detection.markers import Seen
+from handeye.detection.markers import NO_IDS, Seen
 from handeye.detection.part import mapped
 from handeye.errors import InputError
 from handeye.types import AprilGrid, ArucoGrid, ArucoMarker, Charuco, Target
@@ -94,7 +94,7 @@ def beside(board: Coded, seen: Seen) -> NotFound | None:
     own = board.marker_ids
     if len(own) < 2 or (~np.isin(seen.ids, own)).sum() < FEWEST_BESIDE:
         return None
-    reading = Reading(board.dictionary, board.border_bits, False, seen.ids, seen.corners)
+    reading = Reading(board.dictionary, board.border_bits, False, seen.ids, seen.corners, NO_IDS)
     lattice = max(lattices_of(reading), key=lambda lattice: np.isin(lattice.ids, own).sum())
     others = int((~np.isin(lattice.ids, own)).sum())
     if others < max(FEWEST_BESIDE, (1 - AGREEING) * len(lattice.ids)):

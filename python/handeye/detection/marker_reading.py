@@ -47,6 +47,8 @@ class Reading:
         Width of the border, and whether they are light on dark.
     ids, corners
         (M,) and (M, 4, 2) numbers, none twice, and corners in OpenCV's order.
+    repeated
+        Numbers of markers that are in several places; one place of each is among the others.
     """
 
     dictionary: str
@@ -54,6 +56,7 @@ class Reading:
     inverted: bool
     ids: IndexArray
     corners: FloatArray
+    repeated: IndexArray
 
 
 def read_markers(image: Image) -> Reading | None:
@@ -115,15 +118,18 @@ def _of_dictionaries(
 
 def _identified(
     codes: Image, quads: FloatArray, name: str, correction: float
-) -> tuple[IndexArray, FloatArray]:
-    """Return ids (M,) and corners (M, 4, 2) of codes (Q, B, B) that a dictionary has."""
-    book, found = dictionary(name), dict[int, FloatArray]()
+) -> tuple[IndexArray, FloatArray, IndexArray]:
+    """Return ids (M,), corners (M, 4, 2) and repeated ids of codes (Q, B, B) that a dictionary has."""
+    book, found, repeated = dictionary(name), dict[int, FloatArray](), set[int]()
     for code, quad in zip(codes, quads, strict=True):
         known, number, rotation = book.identify(code, correction)
-        if known:
-            found.setdefault(int(number), np.roll(quad, int(rotation), axis=0))
+        if not known:
+            continue
+        first = found.setdefault(int(number), np.roll(quad, int(rotation), axis=0))
+        if np.linalg.norm(first.mean(axis=0) - quad.mean(axis=0)) > np.linalg.norm(first[1] - first[0]) / 2:
+            repeated.add(int(number))
     corners = np.array(list(found.values())).reshape(-1, 4, 2)
-    return np.array(list(found), dtype=np.int64), corners
+    return np.array(list(found), dtype=np.int64), corners, np.array(sorted(repeated), dtype=np.int64)
 
 
 def _quads(image: Image) -> FloatArray:
