@@ -97,14 +97,24 @@ def fit_corners(
     bands: ArrayLike,
     is_crossing: bool,
     rough: bool,
-) -> NDArray[float64]:
+) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64]]:
     """Corners (N, 2) fitted to grey values; NaN where there is none near the guess.
+
+    Also the covariances (N, 2, 2) of the places for residuals of one grey value, the root mean squares (N,)
+    of the residuals in the smoothed picture, and the contrasts (N,).
 
     `image` (H, W) is contiguous. `places` (N, 2) are guesses, `directions` (N, 2, 2) those of the two edges,
     `curvatures` (N, 2) theirs in 1 / px towards the normals (-sin, cos); `radii` (N,) are free of other edges
     and `bands` (N,) the distances from the edges, in pixels, beyond which there is something else. At a
     crossing diagonal parts are equal and the light may change; else the four parts may be of any grey. A
     `rough` fit ends near the place, as is enough where it tells another fit where to begin.
+    """
+
+def crossing_neighbours(places: ArrayLike, angles: ArrayLike, off: float) -> NDArray[int64]:
+    """Number of the neighbour (N, 4) of each crossing along its edges, -1 for none.
+
+    `places` (N, 2); `angles` (N, 2) of the edges from u towards v, dark between the first and the second.
+    Rays are counted from u towards v from the first edge on; directions may be `off` by an angle in radians.
     """
 
 def area_centroids(
