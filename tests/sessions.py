@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from handeye.robots.simulated import ArmErrors
-from handeye.session.configuration import Configuration, Simulation, begin, go_on, prepare
+from handeye.session.configuration import begin, go_on, prepare
 from handeye.session.loop import End
+from handeye.session.settings import Configuration, Simulation
 from handeye.session.store import is_session, open_session
 
 QUICK = Configuration("epson_c4l", simulation=Simulation(points_only=0.1))

@@ -166,7 +166,8 @@ def test_an_interruption_stops_the_arm_and_leaves_the_session_whole(
     with pytest.raises(KeyboardInterrupt):
         session.run()
     store.close()
-    assert stopped == [True]
+    # Once to see before the first motion that it can be stopped, once as it was interrupted.
+    assert stopped == [True, True]
     assert run(configuration, tmp_path / "a").reason is EndReason.ACCURACY_REACHED
     run(configuration, tmp_path / "b")
     assert Outcome.of(tmp_path / "a") == Outcome.of(tmp_path / "b")

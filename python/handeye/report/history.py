@@ -7,9 +7,9 @@ import numpy as np
 from handeye.errors import HandeyeError, InputError
 from handeye.report.document import Attempt, CurvePoint, Request, Within
 from handeye.robots import ArmKinematics, arm_kinematics, open_arm
-from handeye.session.configuration import Configuration
 from handeye.session.deciding import START_VIEWS
 from handeye.session.request import reach
+from handeye.session.settings import Configuration
 from handeye.session.store import JOURNAL_FILE, is_session, read_journal, read_settings
 from handeye.solving import Measurements, make_estimator
 from handeye.types import Recording

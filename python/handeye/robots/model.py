@@ -125,6 +125,12 @@ class Arm:
         """(n,) largest speeds, radians or metres per second; infinite where unknown."""
         return np.array([joint.velocity for joint in self.joints], dtype=float)
 
+    @property
+    def reach_m(self) -> float:
+        """A length that the flange is at most away from the first joint, sliding joints apart."""
+        offsets = [joint.placement.translation for joint in self.joints[1:]]
+        return float(sum(np.linalg.norm(o) for o in [*offsets, self.T_last_flange.translation]))
+
     def with_flange(self, T_flange_tool: Pose, name: str = "tool") -> "Arm":
         """Return the arm with another frame at its end, `T_flange_tool` away from the flange of this one."""
         return replace(self, T_last_flange=self.T_last_flange @ T_flange_tool, flange=name)
