@@ -74,7 +74,8 @@ def run_killed(configuration: Configuration, folder: Path, random: np.random.Gen
                 code = 0
             finally:
                 os._exit(code)
-        deadline = time.monotonic() + random.exponential(mean_s)
+        # Longer lives after many kills: a slow machine gets to the end too.
+        deadline = time.monotonic() + random.exponential(mean_s) * (1 + kills / 20)
         while time.monotonic() < deadline:
             pid, status = os.waitpid(child, os.WNOHANG)
             if pid:

@@ -10,8 +10,8 @@ from handeye.errors import DeviceError
 from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import EndReason
+from handeye.session.journal import read_journal
 from handeye.session.loop import End
-from handeye.session.store import read_journal
 from handeye.solving.mistakes import CODES
 from handeye.types import Pose
 from sessions import configured
@@ -53,7 +53,7 @@ def ended(folder: Path, at: str = "", error: Pose | None = None) -> tuple[End, P
 
 
 def open_entries(folder: Path) -> int:
-    return len(read_journal(folder / "journal.jsonl")[0])
+    return len(read_journal(folder).entries)
 
 
 def test_a_pose_read_too_early_is_named_and_left_out(tmp_path: Path) -> None:

@@ -27,11 +27,12 @@ from handeye.session.configuration import Prepared, begin, go_on, prepare
 from handeye.session.deciding import START_VIEWS, EndReason
 from handeye.session.drivers import REPLAY, Person
 from handeye.session.entry import Entry
+from handeye.session.journal import read_settings
 from handeye.session.loop import End, Session
 from handeye.session.request import reach
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
-from handeye.session.store import SessionStore, read_settings
+from handeye.session.store import SessionStore
 from handeye.solving import Estimate
 from handeye.types import Mounting
 from handeye.types.calibration import MM_PER_M, ModelName
@@ -186,7 +187,7 @@ def _driven(loop: Session, store: SessionStore, prepared: Prepared) -> End:
 
 
 def _resumed(session: Path, person: Person, confirm: bool | None, *, as_json: bool) -> Answer:
-    configuration = Configuration.from_dict(read_settings(session).get("configuration"))
+    configuration = Configuration.from_dict(read_settings(session).asked.get("configuration"))
     loop, store, prepared = go_on(
         session,
         None if as_json else _Progress(),

@@ -24,7 +24,7 @@ from handeye.session.entry import Entry
 from handeye.session.loop import Progress, Session
 from handeye.session.recorded import RecordedChooser
 from handeye.session.safety import body_of
-from handeye.session.settings import Collisions, Configuration, read_start
+from handeye.session.settings import Collisions, Configuration, check_fingerprints, fingerprints, read_start
 from handeye.session.simulated import SimulationOptions, simulated_cell
 from handeye.session.starting import Start
 from handeye.session.store import SessionStore, create_session, open_session
@@ -176,6 +176,7 @@ def begin(prepared: Prepared, folder: Any, progress: Progress | None = None) -> 
             "joints_rad": list(prepared.start.joints_rad),
             "posture_known": prepared.start.posture_known,
         }
+    settings |= fingerprints(prepared.cell.arm, prepared.recorded)
     chooser = prepared.chooser()
     store = create_session(folder, prepared.recording, settings)
     return Session(prepared.cell, store, chooser, prepared.configuration.wish(), progress), store
@@ -212,6 +213,7 @@ def go_on(
             confirm=confirm,
             start=start,
         )
+        check_fingerprints(store.settings, fingerprints(prepared.cell.arm, prepared.recorded))
         if prepared.hidden_arm is not None and start is not None:
             prepared.hidden_arm.place(_left_at(store.entries) or start.joints_rad)
         session = Session(prepared.cell, store, prepared.chooser(), configuration.wish(), progress)

@@ -1,6 +1,7 @@
 """Everything that was asked for, as it is written into a session."""
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -12,6 +13,7 @@ from handeye.errors import InputError
 from handeye.planning.collisions import Workspace
 from handeye.planning.policies import make_policy
 from handeye.planning.sieve import ViewLimits
+from handeye.robots import Arm
 from handeye.robots.simulated import ArmErrors
 from handeye.session.attempt import Patience
 from handeye.session.drivers import MANUAL, REPLAY
@@ -19,7 +21,7 @@ from handeye.session.faults import FaultRates
 from handeye.session.simulated import usual_errors
 from handeye.session.starting import Start
 from handeye.session.wish import Wish
-from handeye.types import Mounting, Pose
+from handeye.types import Mounting, Pose, View
 from handeye.types.calibration import ModelName
 from handeye.types.plain import read_document
 
@@ -167,3 +169,33 @@ class _StartDocument:
     T_base_flange: list[list[float]]
     joints_rad: list[float]
     posture_known: bool = True
+
+
+def fingerprints(arm: Arm | None, recorded: Sequence[View] | None) -> dict[str, str]:
+    """Return checksums of what the settings only name: the arm's description, the recording of a replay."""
+    found: dict[str, str] = {}
+    if arm is not None:
+        found["arm"] = arm.fingerprint
+    if recorded is not None:
+        content = msgspec.json.encode([view.to_dict() for view in recorded])
+        found["recorded"] = hashlib.blake2b(content, digest_size=16).hexdigest()
+    return found
+
+
+def check_fingerprints(settings: Mapping[str, Any], found: Mapping[str, str]) -> None:
+    """Refuse to go on with another arm or recording than the session began with.
+
+    Raises
+    ------
+    InputError
+        It is another.
+    """
+    words = {"arm": "the description of the arm", "recorded": "the recording that is replayed"}
+    for name, fingerprint in found.items():
+        # Sessions of version 1 do not say.
+        if settings.get(name, fingerprint) != fingerprint:
+            raise InputError(
+                f"{words[name]} is not what it was when the session began",
+                code="settings_changed",
+                hint="undo the change, or begin a new session",
+            )
