@@ -19,16 +19,17 @@ import time
 from pathlib import Path
 from typing import Any
 
-ROBOT = (
-    "ok raise raise_once sysexit kbd hang hang_once slow refuse half elsewhere ignore mem longmsg binmsg "
-    "degrees degrees_nojoint offset offset_nojoints frozen none matrix nanjoints fewjoints manyjoints "
-    "emptyjoints nppose npjoints strjoints mm inverse nanpose readhang stopraise stophang"
-).split()
-CAMERA = (
-    "none array raise hang hang_once stale stalenoise colour size float readonly strided fortran flip rot "
-    "black noise tsnan tsstr points_nan points_dup points_out points_many points_list"
-).split()
+ROBOT = """
+ok raise raise_once sysexit kbd hang hang_once slow refuse half elsewhere ignore mem longmsg binmsg degrees
+degrees_nojoint offset offset_nojoints frozen none matrix nanjoints fewjoints manyjoints emptyjoints nppose
+npjoints strjoints mm inverse nanpose readhang stopraise stophang
+"""
+CAMERA = """
+none array raise hang hang_once stale stalenoise colour size float readonly strided fortran flip rot black
+noise tsnan tsstr points_nan points_dup points_out points_many points_list
+"""
 # Few views, much asked for, little patience: the faults come at the fourth motion or picture.
+HANDEYE = (sys.executable, "-c", "from handeye.cli import main; main()")
 ASKED = ("--accuracy-mm", "0.02", "--accuracy-deg", "0.002", "--max-views", "8", "--no-confirm")
 TIMES = ("--move-timeout-s", "1.5", "--read-timeout-s", "1", "--camera-timeout-s", "1")
 SPACE = ("--workspace-mm", "-900", "-900", "20", "900", "900", "1400")
@@ -65,13 +66,13 @@ def attempt(drivers: Path, robot: str, camera: str, points: bool, seconds: float
         folder = Path(name)
         log = folder / "evil.log"
         environment = dict(os.environ) | {
-            "PYTHONPATH": str(drivers),
+            "PYTHONPATH": os.pathsep.join([str(drivers), os.environ.get("PYTHONPATH", "")]),
             "EVIL_LOG": str(log),
             "EVIL_SLOW": "2.5",
         }
         if points:
             environment["EVIL_POINTS"] = "1"
-        command = [sys.executable, "-m", "handeye.cli", "run", "--session", str(folder / "session")]
+        command = [*HANDEYE, "run", "--session", str(folder / "session")]
         first = [
             *("--robot", "epson_c4l", "--driver", robot, "--images", camera),
             *("--camera", str(drivers / "simcam.json"), "--target", str(drivers / "simtarget.json")),
@@ -108,8 +109,8 @@ def main() -> int:
     parser.add_argument("--rendered", action="store_true", help="pictures instead of points")
     parser.add_argument("--seconds", type=float, default=120.0, help="longest run")
     options = parser.parse_args()
-    cases = [(f"evil:{mode}", "evilcam:ok,99") for mode in ROBOT]
-    cases += [("evil:ok,99", f"evilcam:{mode}") for mode in CAMERA]
+    cases = [(f"evil:{mode}", "evilcam:ok,99") for mode in ROBOT.split()]
+    cases += [("evil:ok,99", f"evilcam:{mode}") for mode in CAMERA.split()]
     bad = 0
     for robot, camera in cases:
         mode = robot.partition(":")[2] if camera.endswith("ok,99") else camera.partition(":")[2]
@@ -120,10 +121,11 @@ def main() -> int:
         wrong = found["beyond"] > 0 or found["concurrent"] > 0 or 1 in codes or "timeout" in codes
         wrong = wrong or bool(found.get("traceback"))
         bad += wrong
+        counts = f"moves {found['moves']} beyond {found['beyond']} at once {found['concurrent']}"
         print(
-            f"{'WRONG' if wrong else 'ok':<6}{robot:<20} {camera:<20} exit {found['code']} then {found['again']} "
-            f"moves {found['moves']} beyond {found['beyond']} at once {found['concurrent']} "
-            f"{found['seconds']:.0f} s {','.join(found.get('failures', []))} | {found['said'][:150]}",
+            f"{'WRONG' if wrong else 'ok':<6}{robot:<20} {camera:<20} exit {found['code']} "
+            f"then {found['again']} {counts} {found['seconds']:.0f} s "
+            f"{','.join(found.get('failures', []))} | {found['said'][:150]}",
             flush=True,
         )
     print(f"{bad} of {len(cases)} wrong")

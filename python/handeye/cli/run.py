@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
-from handeye.cli.options import Common
+from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder
 from handeye.cli.run_options import Limits, Simulated, Timeouts
 from handeye.cli.session_report import report_of_session
@@ -56,7 +56,7 @@ def run(
     accuracy_mm: float = 0.5,
     accuracy_deg: float = 0.05,
     max_views: int = 20,
-    seed: int = 0,
+    seed: Seed = 0,
     model: ModelName = ModelName.AUTO,
     policy: str = "next_best_view",
     refine: bool = True,
@@ -300,7 +300,7 @@ def _plan(prepared: Prepared) -> Answer:
         for goal in goals:
             # Nobody has told which posture it is: joints of another one would be a trap.
             known = goal if start.posture_known else replace(goal, joints_rad=None)
-            console.print(describe(known, list(Notation), prepared.arm.sliding), markup=False)
+            console.print(describe(known, list(Notation), prepared.arm.sliding), soft_wrap=True)
 
     return Answer(data, show)
 

@@ -54,7 +54,9 @@ class Workspace:
     def __post_init__(self) -> None:
         lower = finite_array(self.lower_m, (3,), "workspace: lower_m")
         upper = finite_array(self.upper_m, (3,), "workspace: upper_m")
-        if (lower >= upper).any() or min(self.link_radius_m, self.tool_radius_m) < 0:
+        radii = self.link_radius_m, self.tool_radius_m
+        finite_array([self.floor_m, *radii], (3,), "workspace: floor and radii")
+        if (lower >= upper).any() or min(radii) < 0:
             raise InputError(
                 f"workspace: from {lower} to {upper}, expected a box with an inside, radii not negative",
                 code="out_of_range",

@@ -233,7 +233,8 @@ def describe(goal: Goal, notations: Sequence[Notation], sliding: Sequence[bool] 
             units = "  mm, quaternion"
         lines.append(f"  {notation:<6} {pose_text(goal.T_base_flange, notation)}{units}")
         if notation is Notation.UR:
-            x, y, z, rx, ry, rz = pose_numbers(goal.T_base_flange, notation)
+            # Adding zero turns a negative zero into a plain one.
+            x, y, z, rx, ry, rz = (round(v, 5) + 0.0 for v in pose_numbers(goal.T_base_flange, notation))
             lines.append(
                 f"         X {1e3 * x:.2f}  Y {1e3 * y:.2f}  Z {1e3 * z:.2f}  mm   "
                 f"RX {rx:.4f}  RY {ry:.4f}  RZ {rz:.4f}  rad (pendant)"

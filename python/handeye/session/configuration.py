@@ -358,7 +358,8 @@ def _simulated(
     )
     made = simulated_cell(arm, options)
     cell = made.cell
-    workspace = cell.workspace if configuration.workspace_m is None else configuration.workspace()
+    around = None if cell.workspace is None else replace(cell.workspace, floor_m=configuration.floor_m)
+    workspace = around if configuration.workspace_m is None else configuration.workspace()
     cell = replace(
         cell,
         workspace=workspace,

@@ -132,9 +132,10 @@ def create_session(folder: Path, recording: Recording, settings: Mapping[str, An
         The folder is not empty, or the system refuses to write.
     """
     empty = recording.with_views(())
+    asked = Settings(settings, replace(empty, truth=None).to_dict()).to_bytes()
     with new_folder(folder) as partial:
         write_recording(empty, partial)
-        write_file(partial / SETTINGS_FILE, Settings(settings, replace(empty, truth=None).to_dict()).to_bytes())
+        write_file(partial / SETTINGS_FILE, asked)
         write_file(partial / JOURNAL_FILE, b"")
     return open_session(folder)
 
