@@ -18,7 +18,7 @@ from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
 from handeye.planning.collisions import Body
-from handeye.planning.sieve import ViewLimits
+from handeye.planning.constraints import ViewLimits
 from handeye.robots import open_arm
 from handeye.robots.manual import describe
 from handeye.robots.notations import Notation

@@ -36,7 +36,7 @@ def load(
     layout
         Name of one of `IMPORTERS`; None to recognise it.
     target, pattern, mounting
-        What the files of others leave open, see `ImportOptions`; not for a recording, which says it all.
+        What the files of others leave open, see `ImportOptions`; a recording leaves nothing open.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""One door for whoever has a folder: recordings pass, images are searched for the target first."""
+"""One entry for folders: recordings pass, images are searched for the target first."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -122,7 +122,7 @@ def open_folder(
 
 
 def _nothing(done: int, total: int) -> None:
-    """Be the progress of whoever wants none."""
+    """Report no progress."""
 
 
 def _of_recording(loaded: LoadedRecording, camera: Camera | None) -> Opened:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from handeye.planning.collisions import Body, Workspace
-from handeye.planning.sieve import mounted_points
+from handeye.planning.constraints import mounted_points
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
 from handeye.robots.motion import AGREEMENT_M, AGREEMENT_RAD

@@ -11,8 +11,8 @@ import numpy as np
 
 from handeye.errors import InputError
 from handeye.planning.collisions import Workspace
+from handeye.planning.constraints import ViewLimits
 from handeye.planning.policies import make_policy
-from handeye.planning.sieve import ViewLimits
 from handeye.robots import Arm
 from handeye.robots.simulated import ArmErrors
 from handeye.session.attempt import Patience

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::camera::Camera;
 use crate::error::Error;
-use crate::least_squares::{Loss, PixelParameters, Problem, view_block};
+use crate::least_squares::{PixelParameters, Problem, view_block};
 use crate::se3::Se3;
 
 /// A view reduced to the pose that fits its image best.
@@ -42,10 +42,9 @@ pub fn compress(
     pose: &Se3,
     parameters: Option<&PixelParameters>,
 ) -> Result<CompressedView, Error> {
-    let block =
-        view_block(problem, k, camera, 0.0, pose, 1.0, parameters, Loss::Squared).ok_or_else(|| {
-            Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
-        })?;
+    let block = view_block(problem, k, camera, pose, 1.0, parameters).ok_or_else(|| {
+        Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
+    })?;
     let covariance = block
         .m
         .cholesky()

@@ -8,9 +8,10 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 use super::chain::WeakPrior;
 use super::systems::{eliminate, entries_of, start_of, substitute};
 use super::twists::{exponential, logarithm, product};
-use crate::lanes::{UPPER, entries, load, right_product, store, upper};
+use crate::batched_algebra::{UPPER, load, store, upper};
 use crate::least_squares::through_chain;
 use crate::se3::Se3;
+use crate::se3::{entries, right_product};
 use crate::simd::{Kernel, MAX_LANES, Mask, Simd, Vector, VectorUnit, dispatch};
 
 type Row = [f64; MAX_LANES];

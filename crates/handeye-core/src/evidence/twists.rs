@@ -154,8 +154,9 @@ mod tests {
     use nalgebra::{Matrix3, Vector3, Vector6};
 
     use super::*;
-    use crate::lanes::{entries, load, store};
+    use crate::batched_algebra::{load, store};
     use crate::se3::Se3;
+    use crate::se3::entries;
     use crate::simd::{Kernel, MAX_LANES, VectorUnit, dispatch};
     use crate::testing::Random;
 

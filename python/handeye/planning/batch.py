@@ -20,7 +20,7 @@ OBJECTIVES = ("entropy", "entropy_handeye", "tool_point")
 
 
 @dataclass(frozen=True, eq=False)
-class JointPlan:
+class BatchPlan:
     """k views chosen together.
 
     Parameters
@@ -54,7 +54,7 @@ class JointPlan:
         )
 
 
-def plan_jointly(
+def plan_batch(
     estimate: Estimate,
     pool: Pool,
     count: int,
@@ -62,7 +62,7 @@ def plan_jointly(
     objective: str = "entropy",
     tool_points_m: ArrayLike | None = None,
     sight: Sight | None = None,
-) -> JointPlan:
+) -> BatchPlan:
     """Choose `count` views of a pool together, under the likeliest hypothesis about the robot's noise.
 
     Parameters
@@ -111,6 +111,6 @@ def plan_jointly(
     )
     total: FloatArray = hypothesis.information + np.sum(offered[chosen], axis=0)
     covariance = regular_information(total)[:6, :6]
-    return JointPlan(
+    return BatchPlan(
         tuple(pool.candidates[int(feasible[i])] for i in chosen), worth, bound, efficiency, covariance
     )

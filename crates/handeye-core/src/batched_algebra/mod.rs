@@ -1,24 +1,20 @@
-//! Geometry of many candidates or views side by side: one per lane of a vector.
+//! Linear algebra of many candidates or views side by side: one per lane of a vector.
 //!
 //! What lies in memory lies as structure of arrays: rows of one value per candidate.
 
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 
 mod factor;
-mod lens;
 mod moments;
 mod plane_moments;
 mod symmetric;
-mod transform;
 
 use crate::simd::{Simd, Vector};
 
 pub(crate) use factor::{factorise, log_pivots};
-pub(crate) use lens::{Bent, Window, bend};
 pub(crate) use moments::Sums;
 pub(crate) use plane_moments::PlaneMoments;
 pub(crate) use symmetric::{UPPER, triangle, upper};
-pub(crate) use transform::{entries, left_product, right_product};
 
 /// Lanes `at..` of each row.
 #[inline(always)]
@@ -32,6 +28,17 @@ pub(crate) fn load<S: Simd, const N: usize, const WIDTH: usize>(
         *vector = simd.load(&row[at..]);
     }
     out
+}
+
+/// Writes the column of a lane into rows.
+pub(crate) fn set_lane<const N: usize, const WIDTH: usize>(
+    rows: &mut [[f64; WIDTH]; N],
+    lane: usize,
+    values: &[f64; N],
+) {
+    for (row, value) in rows.iter_mut().zip(values) {
+        row[lane] = *value;
+    }
 }
 
 /// Writes lanes `at..` of each row.

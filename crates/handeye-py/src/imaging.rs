@@ -1,9 +1,9 @@
 //! Measuring in pictures.
 
 use handeye_core::error::Error;
-use handeye_core::picture::Picture;
-use handeye_core::picture::corner::{CornerFitter, CornerGuess, CornerKind};
-use handeye_core::picture::spot::{Spot, area_centroid, free_gaps as core_free_gaps};
+use handeye_core::imaging::Picture;
+use handeye_core::imaging::corner::{CornerFitter, CornerGuess, CornerKind};
+use handeye_core::imaging::spot::{Spot, area_centroid, free_gaps as core_free_gaps};
 use numpy::{PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 

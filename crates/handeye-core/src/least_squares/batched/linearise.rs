@@ -1,39 +1,34 @@
 //! Residuals and their derivatives: the 6 x 6 information and gradient of each view, lanes = views.
 
-use super::measurements::{Group, Measurements, Point, Row, Whitening};
-use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
-use crate::lanes::{Bent, Sums, UPPER, bend, left_product, load, right_product, store, upper};
-use crate::least_squares::Loss;
-use crate::simd::{Kernel, MAX_LANES, Simd, Vector, ln};
+use crate::batched_algebra::{Sums, UPPER, load, store, upper};
+use crate::camera::{DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, distort};
+use crate::least_squares::measurements::{Group, Measurements, Point, Row};
+use crate::se3::{left_product, right_product};
+use crate::simd::{Kernel, MAX_LANES, Simd, Vector};
 
 /// What a group of views is found to be at one state.
 #[derive(Clone)]
 #[repr(C, align(64))]
-pub(super) struct Sight {
-    /// `X` and the robot's motion, its error included; then `T_camera_target`.
+pub(super) struct LinearisedGroup {
+    /// `X` and the robot's motion.
     pub before_y: [Row; 12],
-    pub pose: [Row; 12],
-    /// `M` and `G' W r`.
+    /// `M` and `G' r / sigma^2`.
     pub information: [Row; UPPER],
     pub gradient: [Row; 6],
-    /// Sum of `rho`.
+    /// Sum of squared whitened residuals.
     pub cost: Row,
-    /// Sum of squared residuals, px^2.
-    pub squared_px: Row,
     /// One where every point is in front of the camera and in the lens' valid region.
     pub whole: Row,
 }
 
-impl Sight {
+impl LinearisedGroup {
     pub fn new() -> Self {
         const ZERO: Row = [0.0; MAX_LANES];
         Self {
             before_y: [ZERO; 12],
-            pose: [ZERO; 12],
             information: [ZERO; UPPER],
             gradient: [ZERO; 6],
             cost: ZERO,
-            squared_px: ZERO,
             whole: ZERO,
         }
     }
@@ -45,26 +40,21 @@ pub(super) struct Optics {
     pub max_squared_radius: f64,
 }
 
-/// Looks at all views from a state.
+/// Linearises all views at a state.
 ///
-/// `DISTORTED` and `FULLY` say whether the lens bends and whether it does so with all of Brown's and Conrady's
-/// terms; `ALIKE` that all points count alike: no robust loss and no covariances of points.
-pub(super) struct Look<'a, const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> {
+/// `DISTORTED` and `FULLY` say whether the lens distorts and whether it does so with all of Brown's and Conrady's
+/// terms.
+pub(super) struct Linearise<'a, const DISTORTED: bool, const FULLY: bool> {
     pub x: &'a [f64; 12],
     pub y: &'a [f64; 12],
-    /// Motions of each group with the robot's errors; none where the robot is exact.
-    pub motions: &'a [[Row; 12]],
     /// `1 / sigma^2` of each group's pixels.
     pub information: &'a [Row],
     pub optics: &'a Optics,
-    pub loss: Loss,
     pub measurements: &'a Measurements,
-    pub out: &'a mut [Sight],
+    pub out: &'a mut [LinearisedGroup],
 }
 
-impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> Kernel
-    for Look<'_, DISTORTED, FULLY, ALIKE>
-{
+impl<const DISTORTED: bool, const FULLY: bool> Kernel for Linearise<'_, DISTORTED, FULLY> {
     type Output = ();
 
     #[inline(always)]
@@ -72,15 +62,14 @@ impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> Kernel
         let p = &self.optics.parameters;
         let aspect = p[1] / p[0];
         let squared_focal = simd.splat(p[0] * p[0]);
-        let how = How::<DISTORTED, FULLY, ALIKE> { optics: self.optics, loss: self.loss };
+        let how = How::<DISTORTED, FULLY> { optics: self.optics };
         for (g, group) in self.measurements.groups.iter().enumerate() {
             let out = &mut self.out[g];
-            let motions = self.motions.get(g).unwrap_or(&group.motions);
             for at in (0..MAX_LANES).step_by(S::LANES) {
-                let before_y = left_product(simd, self.x, &load(simd, motions, at));
+                let before_y = left_product(simd, self.x, &load(simd, &group.motions, at));
                 let pose = right_product(simd, &before_y, self.y);
                 let weight = simd.load(&self.information[g][at..]) * squared_focal;
-                let mut view = View::new(simd, aspect, weight);
+                let mut view = View::new(simd, aspect);
                 for (i, point) in group.points.iter().enumerate() {
                     if i < group.full {
                         how.add::<S, false>(simd, &mut view, group, i, point, &pose, at);
@@ -89,14 +78,13 @@ impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> Kernel
                     }
                 }
                 store(&before_y, &mut out.before_y, at);
-                store(&pose, &mut out.pose, at);
                 let count = simd.load(&group.counts[at..]);
-                let mut information = if DISTORTED || !ALIKE {
+                let mut information = if DISTORTED {
                     view.information
                 } else {
                     view.sums.information(simd, aspect * aspect, count)
                 };
-                if DISTORTED || !ALIKE {
+                if DISTORTED {
                     for i in [2, 3] {
                         for j in [0, 1, 4, 5] {
                             information[upper(i, j)] = -information[upper(i, j)];
@@ -110,9 +98,7 @@ impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> Kernel
                     let signed = if i == 2 || i == 3 { -*sum } else { *sum };
                     (signed * weight).store(&mut row[at..]);
                 }
-                let cost = if ALIKE { view.squared * weight } else { view.cost };
-                cost.store(&mut out.cost[at..]);
-                (view.squared * squared_focal).store(&mut out.squared_px[at..]);
+                (view.squared * weight).store(&mut out.cost[at..]);
                 view.whole.store(&mut out.whole[at..]);
             }
         }
@@ -126,39 +112,33 @@ struct View<V> {
     information: [V; UPPER],
     gradient: [V; 6],
     squared: V,
-    cost: V,
     whole: V,
     aspect: V,
     squared_aspect: V,
-    /// `(f_x / sigma)^2`.
-    weight: V,
 }
 
 impl<V: Vector> View<V> {
     #[inline(always)]
-    fn new<S: Simd<Vector = V>>(simd: S, aspect: f64, weight: V) -> Self {
+    fn new<S: Simd<Vector = V>>(simd: S, aspect: f64) -> Self {
         let zero = simd.splat(0.0);
         Self {
             sums: Sums::new(simd),
             information: [zero; UPPER],
             gradient: [zero; 6],
             squared: zero,
-            cost: zero,
             whole: simd.splat(1.0),
             aspect: simd.splat(aspect),
             squared_aspect: simd.splat(aspect * aspect),
-            weight,
         }
     }
 }
 
 /// How points are looked at.
-struct How<'a, const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> {
+struct How<'a, const DISTORTED: bool, const FULLY: bool> {
     optics: &'a Optics,
-    loss: Loss,
 }
 
-impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> How<'_, DISTORTED, FULLY, ALIKE> {
+impl<const DISTORTED: bool, const FULLY: bool> How<'_, DISTORTED, FULLY> {
     /// Adds a point; `RAGGED` where some lanes have run out of points.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "one call for both kinds of point")]
@@ -183,12 +163,12 @@ impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> How<'_, DISTOR
         let mut w = one / moved[2];
         let (mut x, mut y) = (moved[0] * w, moved[1] * w);
         let front = moved[2].greater(simd.splat(MIN_DEPTH_M));
-        let bent: Bent<S::Vector> = if DISTORTED {
-            bend::<S, FULLY, FULLY>(simd, &self.optics.parameters, x, y)
+        let distorted: DistortedPoint<S::Vector> = if DISTORTED {
+            distort::<S, FULLY, FULLY>(simd, &self.optics.parameters, x, y)
         } else {
-            Bent::straight(simd, x, y)
+            DistortedPoint::unchanged(simd, x, y)
         };
-        let in_sight = front & bent.is_valid(simd, self.optics.max_squared_radius);
+        let in_sight = front & distorted.is_valid(simd, self.optics.max_squared_radius);
         // Rows that a lane has no point for are zero.
         let counts = simd.load(&group.counts[at..]).greater(simd.splat(i as f64));
         view.whole = if RAGGED {
@@ -196,50 +176,35 @@ impl<const DISTORTED: bool, const FULLY: bool, const ALIKE: bool> How<'_, DISTOR
         } else {
             view.whole.keep(in_sight)
         };
-        let mut u = bent.x - simd.load(&point.seen[0][at..]);
-        let mut v = bent.y - simd.load(&point.seen[1][at..]);
+        let mut u = distorted.x - simd.load(&point.seen[0][at..]);
+        let mut v = distorted.y - simd.load(&point.seen[1][at..]);
         if RAGGED {
             (u, v) = (u.keep(counts), v.keep(counts));
         }
-        if !DISTORTED && ALIKE {
+        if !DISTORTED {
             if RAGGED {
                 (w, x, y) = (w.keep(counts), x.keep(counts), y.keep(counts));
             }
             view.add_pinhole(w, x, y, u, v);
             return;
         }
-        let (a, b) = (bent.along_x, bent.cross_x);
-        let (c, d) = (bent.cross_y * view.aspect, bent.along_y * view.aspect);
+        let (a, b) = (distorted.along_x, distorted.cross_x);
+        let (c, d) = (distorted.cross_y * view.aspect, distorted.along_y * view.aspect);
         v = v * view.aspect;
         let mut rows = [row(a, b, w, x, y), row(c, d, w, x, y)];
         view.squared = u.mul_add(u, v.mul_add(v, view.squared));
-        if !ALIKE && let Some(whitening) = group.whitening.get(i) {
-            (rows, u, v) = whiten(simd, whitening, &rows, u, v, at);
-        }
-        let mut weighted = rows;
-        if !ALIKE {
-            let s = u.mul_add(u, v * v) * view.weight;
-            let (rho, slope) = evaluate(simd, self.loss, s);
-            view.cost = view.cost + if RAGGED { rho.keep(counts) } else { rho };
-            for row in &mut weighted {
-                for entry in row {
-                    *entry = *entry * slope;
-                }
-            }
-        }
         if RAGGED {
-            for row in &mut weighted {
+            for row in &mut rows {
                 for entry in row {
                     *entry = entry.keep(counts);
                 }
             }
         }
-        for (weighted, (row, residual)) in weighted.iter().zip([(&rows[0], u), (&rows[1], v)]) {
+        for (row, residual) in [(&rows[0], u), (&rows[1], v)] {
             for i in 0..6 {
-                view.gradient[i] = weighted[i].mul_add(residual, view.gradient[i]);
+                view.gradient[i] = row[i].mul_add(residual, view.gradient[i]);
                 for j in i..6 {
-                    view.information[upper(i, j)] =
-                        weighted[i].mul_add(row[j], view.information[upper(i, j)]);
+                    view.information[upper(i, j)] = row[i].mul_add(row[j], view.information[upper(i, j)]);
                 }
             }
         }
@@ -269,47 +234,4 @@ impl<V: Vector> View<V> {
 fn row<V: Vector>(a: V, b: V, w: V, x: V, y: V) -> [V; 6] {
     let s = a.mul_add(x, b * y);
     [a * w, b * w, s * w, y.mul_add(s, b), x.mul_add(s, a), b.mul_add(x, -(a * y))]
-}
-
-/// Rows and residuals times the square root of a point's information.
-#[inline(always)]
-fn whiten<S: Simd>(
-    simd: S,
-    whitening: &Whitening,
-    rows: &[[S::Vector; 6]; 2],
-    u: S::Vector,
-    v: S::Vector,
-    at: usize,
-) -> ([[S::Vector; 6]; 2], S::Vector, S::Vector) {
-    let [w11, w21, w22] = load(simd, whitening, at);
-    let mut out = *rows;
-    for i in 0..6 {
-        out[0][i] = w11 * rows[0][i];
-        out[1][i] = w21.mul_add(rows[0][i], w22 * rows[1][i]);
-    }
-    (out, w11 * u, w21.mul_add(u, w22 * v))
-}
-
-/// `(rho(s), rho'(s))` of squared whitened residuals, as [`Loss::evaluate`].
-#[inline(always)]
-fn evaluate<S: Simd>(simd: S, loss: Loss, s: S::Vector) -> (S::Vector, S::Vector) {
-    let one = simd.splat(1.0);
-    match loss {
-        Loss::Squared => (s, one),
-        Loss::Huber(c) => {
-            let near = simd.splat(c * c).at_least(s);
-            let r = s.sqrt();
-            let rho = simd.splat(2.0 * c).mul_add(r, simd.splat(-c * c));
-            (s.keep_or(near, rho), one.keep_or(near, simd.splat(c) / r))
-        }
-        Loss::Cauchy(c) => {
-            let squared = simd.splat(c * c);
-            (squared * ln(simd, one + s / squared), squared / (squared + s))
-        }
-        Loss::Tukey(c) => {
-            let q = (one - s / simd.splat(c * c)).max(simd.splat(0.0));
-            let third = simd.splat(c * c / 3.0);
-            (third * (one - q * q * q), q * q)
-        }
-    }
 }

@@ -2,8 +2,8 @@
 
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 
-use super::corner::CornerGuess;
 use super::corner_equations::Samples;
+use super::corner_guess::CornerGuess;
 use super::{Picture, index, nearest, single};
 use crate::simd::{Kernel, Simd, Vector, VectorUnit, dispatch};
 

@@ -7,6 +7,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::Picture;
 use super::corner_equations::{Equations, FIRST, Greys, LOG_BLUR, MEAN, N, PRODUCT, SECOND, Sum, X, Y};
+pub use super::corner_guess::CornerGuess;
 use super::corner_window::{SMOOTHING_PX, Window};
 use crate::simd::{VectorUnit, dispatch};
 
@@ -36,28 +37,6 @@ pub enum CornerKind {
     Crossing,
     /// Four parts of any grey: the corner of a tag, with or without a square that touches it.
     Quadrants,
-}
-
-/// A first guess of a corner.
-#[derive(Clone, Copy, Debug)]
-pub struct CornerGuess {
-    /// Where it is, off by no more than a pixel or two.
-    pub place: [f64; 2],
-    /// Directions of the two edges.
-    pub directions: [[f64; 2]; 2],
-    /// Curvatures of the edges in 1 / px, towards their normals `(-sin, cos)`.
-    pub curvatures: [f64; 2],
-    /// Radius in pixels in which there are no other edges.
-    pub radius: f64,
-    /// Distance from the edges in pixels beyond which there is something else.
-    pub band: f64,
-}
-
-impl CornerGuess {
-    fn is_usable(&self) -> bool {
-        let numbers = [self.place, self.directions[0], self.directions[1], self.curvatures];
-        numbers.iter().flatten().chain([&self.radius, &self.band]).all(|x| x.is_finite()) && self.radius > 0.0
-    }
 }
 
 /// Fits corners in a picture, one after the other.

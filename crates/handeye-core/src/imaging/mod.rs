@@ -3,6 +3,7 @@
 pub mod alignment;
 pub mod corner;
 mod corner_equations;
+mod corner_guess;
 mod corner_window;
 mod correlation;
 pub mod plane_map;

@@ -56,7 +56,7 @@ class ViewLimits:
 
 
 @dataclass(frozen=True, eq=False)
-class Sieve:
+class ViewConstraints:
     """Everything that a posture must pass, by what is believed now.
 
     Parameters
@@ -88,11 +88,11 @@ class Sieve:
         """The arm."""
         return self.body.arm
 
-    def sift(self, joints: FloatArray) -> tuple[IndexArray, Counter[str]]:
+    def passing(self, joints: FloatArray) -> tuple[IndexArray, Counter[str]]:
         """Return which of postures (N, n) pass, in their order, and for which first reason others do not."""
         left = np.arange(len(joints))
         turned_down: Counter[str] = Counter()
-        # Each is asked only of what the ones before it let through; the dear ones come last.
+        # Each is asked only of what the ones before it let through; the costly ones come last.
         for reasons in (self._bad_views, self._hidden, self.body.obstacles, self._failed_before):
             why = reasons(joints[left])
             turned_down.update(reason for reason in why if reason is not None)

@@ -8,7 +8,7 @@ import pytest
 from cells import Cell
 from handeye.errors import InputError
 from handeye.planning import Pool
-from handeye.planning.joint import OBJECTIVES, plan_jointly
+from handeye.planning.batch import OBJECTIVES, plan_batch
 from handeye.solving import AutoEstimator, Estimate, Measurements, Sight, paper_estimate
 from handeye.types.arrays import FloatArray
 
@@ -42,7 +42,7 @@ def worths(totals: FloatArray, objective: str) -> FloatArray:
 def test_five_of_twenty_seven_against_every_choice(objective: str) -> None:
     """All 80,730 choices are tried: the plan reaches 0.995 of the best, the bound is never below it."""
     estimate, pool = situation(1, 27)
-    plan = plan_jointly(estimate, pool, 5, objective=objective, tool_points_m=BOX)
+    plan = plan_batch(estimate, pool, 5, objective=objective, tool_points_m=BOX)
     base = estimate.hypotheses[0].information
     predictor = estimate.predictor(estimate.hypotheses[0], Sight())
     informations = predictor.informations(pool.motions(estimate.mounting))
@@ -62,7 +62,7 @@ def test_five_of_twenty_seven_against_every_choice(objective: str) -> None:
 
 def test_with_robot_noise_and_camera_parameters() -> None:
     estimate, pool = situation(2, 20, auto=True)
-    plan = plan_jointly(estimate, pool, 4, objective="entropy_handeye")
+    plan = plan_batch(estimate, pool, 4, objective="entropy_handeye")
     assert len({candidate.name for candidate in plan.candidates}) == 4
     assert 0.8 < plan.efficiency <= 1
     before = np.linalg.inv(estimate.hypotheses[0].information)[:6, :6]
@@ -73,8 +73,8 @@ def test_with_robot_noise_and_camera_parameters() -> None:
 def test_impossible_questions_are_refused() -> None:
     estimate, pool = situation(3, 3)
     with pytest.raises(InputError, match="4 views of 3"):
-        plan_jointly(estimate, pool, 4)
+        plan_batch(estimate, pool, 4)
     with pytest.raises(InputError, match="expected one of entropy"):
-        plan_jointly(estimate, pool, 2, objective="beauty")
+        plan_batch(estimate, pool, 2, objective="beauty")
     with pytest.raises(InputError, match="tool_points"):
-        plan_jointly(estimate, pool, 2, objective="tool_point")
+        plan_batch(estimate, pool, 2, objective="tool_point")

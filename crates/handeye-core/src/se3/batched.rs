@@ -1,6 +1,8 @@
-//! Products of rigid transforms: rotation row by row, then translation.
+//! Products of rigid transforms in lanes: rotation row by row, then translation.
 
-use crate::se3::Se3;
+#![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
+
+use super::Se3;
 use crate::simd::{Simd, Vector};
 
 /// Rotation row by row, then translation.

@@ -3,7 +3,7 @@
 use nalgebra::{SVector, Vector2, Vector3, Vector6};
 use proptest::prelude::*;
 
-use super::Feature;
+use crate::camera::Feature;
 use crate::camera::tests::camera;
 use crate::camera::{Camera, Lens, MAX_PARAMETERS, ParameterJacobian};
 use crate::se3::Se3;

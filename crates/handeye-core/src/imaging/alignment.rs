@@ -51,7 +51,7 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// Where a board lies whose places are expected at pixels, give or take a margin; `None` where it is not there.
+    /// Where a board lies whose places are expected at pixels, within a margin; `None` where it is not there.
     ///
     /// What is found is not yet proved to be that board: a grid may be a line off, a marker may be another one, and
     /// what is hidden is not known.
