@@ -95,7 +95,8 @@ def checked_reading(
             f"{high[i]:.4g}"
         )
     off = pose.inverse() @ reading.T_base_flange
-    x, y, z = 1e3 * off.translation
+    # Adding zero turns a negative zero into a plain one.
+    x, y, z = np.round(1e3 * off.translation) + 0.0
     turn = np.rad2deg(off.rotation_angle_rad)
     raise _bad(
         f"the pose is not that of {arm.name} at these joints: in the flange of the description it is at "
