@@ -163,7 +163,7 @@ def attempt(
     cell
         Where.
     goal
-        Where to go; checked here from where the arm really stands, whoever chose it.
+        Where to go; checked here from where the arm really stands, however it was chosen.
     digests
         Of the images so far: a picture that comes again is no new picture.
     timings
