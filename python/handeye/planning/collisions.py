@@ -104,9 +104,12 @@ class Body:
         # The base itself stands on the floor.
         low = np.any(frames[:, 3:, 2, 3] - space.link_radius_m < space.floor_m, axis=1)
         low |= np.any(tools[:, :, 2] - space.tool_radius_m < space.floor_m, axis=1)
-        touching = self._touches_itself(frames, tools)
         low_limit, high_limit = self.arm.limits.T
         beyond = np.any((joints < low_limit) | (joints > high_limit), axis=1)
+        # The costliest question only of postures that nothing else speaks against.
+        left = np.flatnonzero(~(beyond | outside | low))
+        touching = np.zeros(len(joints), dtype=bool)
+        touching[left] = self._touches_itself(frames[left], tools[left])
         answers: list[str | None] = []
         for k in range(len(joints)):
             if beyond[k]:
