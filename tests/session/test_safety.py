@@ -227,7 +227,7 @@ def test_where_a_motion_ended_is_judged_too() -> None:
         prepared, robot = watched()
         hidden = prepared.hidden_arm
         assert hidden is not None
-        robot.move_to = lambda goal, to=ended: hidden.move_to(goal_at(arm, to, goal.label))  # type: ignore[method-assign]
+        robot.move_to = lambda goal, to=ended, by=hidden: by.move_to(goal_at(arm, to, goal.label))  # type: ignore[method-assign]
         outcome = tried(replace(prepared.cell, workspace=workspace), goal_at(arm, HOME + 0.05))
         assert isinstance(outcome, Missed)
         assert outcome.failure is Failure.ELSEWHERE
