@@ -191,7 +191,8 @@ def _target(
         raise InputError(
             f"{folder}: the number of corners of the chessboard is not in the files",
             code="pattern_unknown",
-            hint="give the pattern: rows and columns of inner corners",
+            hint="give --rows and --columns of inner corners, or --target FILE for any other board: "
+            "ChArUco, AprilGrid, ArUco markers, circles; handeye target writes such a file",
         )
     if square_m is None:
         raise InputError(

@@ -10,7 +10,8 @@ from handeye.errors import InputError
 from handeye.planning.collisions import Body
 from handeye.planning.visibility import obstacles
 from handeye.robots import Arm
-from handeye.solving.estimate import Estimate, Sight
+from handeye.planning.prediction import Sight
+from handeye.solving.estimate import Estimate
 from handeye.types import Mounting
 from handeye.types.arrays import FloatArray, IndexArray
 

@@ -10,7 +10,8 @@ from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import ViewConstraints, ViewLimits, mounted_points, sight_of
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
-from handeye.solving.estimate import Estimate, Sight
+from handeye.planning.prediction import Sight
+from handeye.solving.estimate import Estimate
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
 

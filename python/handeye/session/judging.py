@@ -129,7 +129,7 @@ def _deviations(estimate: Estimate, A: Pose, expected: Pose) -> tuple[float, flo
     lever[:3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
     jacobian = lever @ jacobian
     covariance = jacobian @ estimate.covariance[:12, :12] @ jacobian.T
-    robot = max(h.robot_translation_m for h in estimate.hypotheses)
+    robot = estimate.noise.robot_translation_m
     sigma_m = float(np.sqrt(np.trace(covariance[:3, :3]) + 3 * robot**2))
     sigma_rad = float(np.sqrt(np.trace(covariance[3:, 3:])))
     return sigma_m, sigma_rad
