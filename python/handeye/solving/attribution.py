@@ -18,8 +18,8 @@ from handeye.types.calibration import Finding, Noise, RobotSide
 
 # Logarithm of a factor in likelihood that counts as decisive (Kass and Raftery 1995: "very strong" is 5).
 DECISIVE = 5.0
-# Share of the misfit, or of what the likelihood needs of the robot, that makes something that can be put right
-# (camera, board, clocks) worth a word.
+# Share of the misfit, or of what the likelihood needs of the robot, that makes something that can be put
+# right (camera, board, clocks) worth a word.
 CONVINCING_SHARE = 0.3
 # Focal lengths and principal point come first.
 _PARAMETERS_IN_PX = 4
