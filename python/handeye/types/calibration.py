@@ -57,7 +57,7 @@ class Noise:
     evidence
         Share of each side in the misfit that the robot explains; all of it at `none` where it is exact.
     pixel_shared
-        By what factor the pixels' deviation counts for more as neighbouring points err alike; 1 if they do not.
+        Factor on the pixels' deviation as neighbouring points err alike; 1 if they do not.
     smooth_probability
         Share of what changes smoothly with the posture of an arm that is not described, not from view to
         view; the covariance counts it, and grows.
