@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from typing import Any, TypeVar
 
-import cv2
 import numpy as np
 
 from handeye.detection import chessboard, tags
