@@ -17,7 +17,7 @@ from handeye.detection.base import (
 )
 from handeye.detection.corner_fit import FEW, WIDE_PX, CornerKind, astray, fit_corners, nearer, spread
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.marker_lattice import beside
+from handeye.detection.marker_lattice import contradiction
 from handeye.detection.markers import (
     LEAST_SHARE,
     Bits,
@@ -91,7 +91,7 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
     if not len(markers):
         return diagnose(image, NotFound(Reason.NO_PATTERN, f"no marker of the board, of {target.dictionary}"))
     places = target.outlines[markers]
-    against = disagreement(places, seen) or beside(target, seen_markers)
+    against = disagreement(places, seen) or contradiction(target, seen_markers)
     if against is not None:
         return against
     # OpenCV gives None where it finds nothing, whatever its types say.
