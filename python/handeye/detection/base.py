@@ -86,6 +86,7 @@ class Reason(StrEnum):
     OTHER_BOARD = "other_board"
     INCOMPLETE = "incomplete"
     INCONSISTENT = "inconsistent"
+    REPEATED = "repeated"
     NO_PATTERN = "no_pattern"
     DETECTOR_FAILED = "detector_failed"
 
@@ -100,6 +101,7 @@ _HINTS = {
     Reason.OTHER_BOARD: "describe the board that is shown",
     Reason.INCOMPLETE: "bring the whole board into the image and nothing in front of it",
     Reason.INCONSISTENT: "check rows, columns and dictionary against the printed board",
+    Reason.REPEATED: "leave one of them in the picture, or give their markers other numbers",
     Reason.NO_PATTERN: "check that the board is in the image, whole, with a white margin, not too oblique",
     Reason.DETECTOR_FAILED: "look at the image; if it is in order, please report it",
 }

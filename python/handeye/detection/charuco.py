@@ -26,8 +26,16 @@ from handeye.detection.corner_fit import (
     spread,
 )
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.marker_lattice import beside
-from handeye.detection.markers import LEAST_SHARE, Bits, Seen, dictionary, disagreement, parameters
+from handeye.detection.marker_lattice import contradiction
+from handeye.detection.markers import (
+    LEAST_SHARE,
+    Bits,
+    Seen,
+    dictionary,
+    disagreement,
+    from_neighbours,
+    parameters,
+)
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import Charuco
 from handeye.types.arrays import FloatArray
@@ -92,7 +100,7 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
     if not len(markers):
         return diagnose(image, NotFound(Reason.NO_PATTERN, f"no marker of the board, of {target.dictionary}"))
     places = target.outlines[markers]
-    against = disagreement(places, seen) or beside(target, seen_markers)
+    against = disagreement(places, seen) or contradiction(target, seen_markers)
     if against is not None:
         return against
     # OpenCV gives None where it finds nothing, whatever its types say.
@@ -110,8 +118,13 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         if lens is not None:
             steps = lens.steps(plane, 0.1 * target.square_m)
         sharp = _measured(image, target, rough, steps)
-        good = ~sharp.spoilt()
-        number = int(good.sum())
+        good = np.flatnonzero(~sharp.spoilt())
+        # What lies in front of the board has edges, too: markers and corners around know better.
+        around = np.concatenate([sharp.places[good], seen.reshape(-1, 2)])
+        expected = from_neighbours(np.concatenate([plane[good], places.reshape(-1, 2)]), around)[: len(good)]
+        pitches = target.square_m * np.linalg.norm(steps[good], axis=2).min(axis=1)
+        good = good[~astray(sharp.places[good], expected, pitches)]
+        number = len(good)
         if number >= FEWEST_CORNERS:
             return ordered(target, numbers[good], sharp.places[good], sharp.sigmas_px[good])
     return NotFound(

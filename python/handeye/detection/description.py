@@ -11,7 +11,7 @@ from handeye.detection.blobs import find_spots
 from handeye.detection.lattice import grow
 from handeye.detection.marker_lattice import boards_like, lattices_of
 from handeye.detection.marker_reading import Reading, read_markers
-from handeye.detection.markers import NO_IDS, Seen
+from handeye.detection.markers import Seen
 from handeye.detection.part import Part
 from handeye.types import Charuco, Chessboard, CircleGrid, Target
 from handeye.types.arrays import IndexArray
@@ -24,6 +24,8 @@ SEARCH_SIDE_PX = 1000
 FEWEST_MARKERS = 4
 # Share of the circles of a grid that must be there, the fewest that are a grid, and the most.
 FILLED, FEWEST_CIRCLES, MOST_CIRCLES = 0.9, 9, 10_000
+# An outermost line of a grid has at least so many of the circles that others have.
+FULL_LINE = 0.5
 # What lengths are taken from where no board is described.
 UNKNOWN = Chessboard(7, 10, 0.02)
 # What a picture says for itself, whatever the board.
@@ -45,9 +47,11 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
     missing
         Why it was not found.
     """
-    if missing.reason in _OF_THE_PICTURE:
+    if missing.reason in _OF_THE_PICTURE or missing.reason is Reason.REPEATED:
         return missing
-    shown, markers = next(_visible(image, target), (None, None))
+    # Where there are markers of the board, it is another with such markers, or none.
+    only_markers = isinstance(target, Coded) and missing.reason is not Reason.NO_PATTERN
+    shown, markers = next(_visible(image, target, only_markers=only_markers), (None, None))
     if shown is None:
         return missing
     if shown != target:
@@ -56,7 +60,7 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
         evidence = f"the picture shows another board: {named}{_difference(target, shown)}"
         return NotFound(reason, evidence, shown, _advice(target, shown))
     if isinstance(target, MarkerCorners) and markers is not None:
-        return tags.measured(*upright(image, target), Seen(markers.ids, markers.corners, NO_IDS))
+        return tags.measured(*upright(image, target), Seen(markers.ids, markers.corners, markers.repeated))
     return missing
 
 
@@ -66,26 +70,30 @@ def shown_board(image: Image) -> Target | None:
 
 
 def _visible(
-    image: Image, target: Target, fewest_markers: int = FEWEST_MARKERS
+    image: Image, target: Target, fewest_markers: int = FEWEST_MARKERS, *, only_markers: bool = False
 ) -> Iterator[tuple[Target, Reading | None]]:
     """Yield boards that an image shows, those of the family described first, and their markers."""
-    # Markers first: between them there are squares, too.
-    yield from _marked(image, target, 1 if isinstance(target, Coded) else fewest_markers)
+    # Markers first: what lies between them looks like squares, too.
+    reading = read_markers(image)
+    if reading is not None:
+        fewest = 1 if isinstance(target, Coded) else fewest_markers
+        yield from ((board, reading) for board in _marked(image, target, reading, fewest))
+        if len(reading.ids) >= FEWEST_MARKERS:
+            return
+    if only_markers:
+        return
     without_markers = (_chessboard, _circle_grid)
     for look in without_markers[::-1] if isinstance(target, CircleGrid) else without_markers:
         for board in look(image, target):
             yield board, None
 
 
-def _marked(image: Image, target: Target, fewest: int) -> Iterator[tuple[Target, Reading]]:
-    reading = read_markers(image)
-    if reading is None:
-        return
+def _marked(image: Image, target: Target, reading: Reading, fewest: int) -> Iterator[Target]:
+    """Yield boards with so many markers at least that have those that were read."""
     height, width = image.shape
     for lattice in lattices_of(reading):
         if len(lattice.ids) >= fewest:
-            for board in boards_like(target, lattice, (width, height)):
-                yield board, reading
+            yield from boards_like(target, lattice, (width, height))
 
 
 def _chessboard(image: Image, target: Target) -> Iterator[Chessboard]:
@@ -110,7 +118,18 @@ def _circle_grid(image: Image, target: Target) -> Iterator[Target]:
                 return
 
 
+def _trimmed(places: IndexArray) -> IndexArray:
+    """Return places (N, 2) without outermost lines that hardly anything is on: spots beside the grid."""
+    for _ in range(2):
+        for axis in (0, 1):
+            values, counts = np.unique(places[:, axis], return_counts=True)
+            full = values[counts >= FULL_LINE * np.median(counts)]
+            places = places[(places[:, axis] >= full.min()) & (places[:, axis] <= full.max())]
+    return places - places.min(axis=0)
+
+
 def _symmetric(places: IndexArray, target: Target) -> list[CircleGrid]:
+    places = _trimmed(places)
     columns, rows = (np.ptp(places, axis=0) + 1).tolist()
     if len(places) < FILLED * rows * columns:
         return []
@@ -122,13 +141,13 @@ def _asymmetric(places: IndexArray, target: Target) -> list[CircleGrid]:
     x = places[:, 0] - places[:, 1]
     y = places[:, 0] + places[:, 1]
     grids: list[CircleGrid] = []
-    turned = np.column_stack([x - x.min(), y - y.min()])
+    turned = _trimmed(np.column_stack([x, y]))
     for _ in range(4):
         width, rows = (turned.max(axis=0) + 1).tolist()
         columns = width // 2
         # Unshifted rows begin at the left, shifted ones end at the right.
         right = (turned[:, 0] % 2 == turned[:, 1] % 2).all() and width == 2 * columns
-        if right and min(rows, columns) >= 2 and len(places) >= FILLED * rows * columns:
+        if right and min(rows, columns) >= 2 and len(turned) >= FILLED * rows * columns:
             grids.append(_circles(target, rows, columns, asymmetric=True))
         turned = np.column_stack([turned[:, 1].max() - turned[:, 1], turned[:, 0]])
     return grids
@@ -206,6 +225,8 @@ def _usual(target: Target, here: dict[str, Any]) -> dict[str, Any]:
     """Return fields of a target that a file of the board shown would leave out, as they are there."""
     gone = set(target.to_dict()) - set(here)
     usual: dict[str, Any] = {"inverted": False, "first_id": 0, "border_bits": 1}
+    if "ids" in gone and "first_id" not in here:
+        gone.add("first_id")
     return {name: value for name, value in usual.items() if name in gone}
 
 

@@ -83,9 +83,10 @@ class Seen:
         Other markers in the picture are no matter: they are of another board.
         """
         of_board = target.marker_ids
-        if (again := int(np.isin(self.repeated, of_board).sum())) > np.isin(self.ids, of_board).sum():
+        once = np.setdiff1d(self.ids, self.repeated)
+        if (again := int(np.isin(self.repeated, of_board).sum())) > np.isin(once, of_board).sum():
             return NotFound(
-                Reason.INCONSISTENT,
+                Reason.REPEATED,
                 f"the board is in the picture twice: {again} of its markers are seen twice",
             )
         order = np.argsort(of_board)

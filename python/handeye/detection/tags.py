@@ -20,7 +20,7 @@ from handeye.detection.corner_fit import (
 )
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.edge_shift import without_edge_shift
-from handeye.detection.marker_lattice import beside
+from handeye.detection.marker_lattice import contradiction
 from handeye.detection.markers import (
     LEAST_SHARE,
     NO_IDS,
@@ -65,7 +65,7 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
         return diagnose(image, NotFound(Reason.NO_PATTERN, f"no marker of the board, of {target.dictionary}"))
     seen = seen[:, target.corner_order]
     points = tags[:, np.newaxis] * 4 + np.arange(4)
-    against = disagreement(target.points[points, :2], seen) or beside(target, markers)
+    against = disagreement(target.points[points, :2], seen) or contradiction(target, markers)
     if against is not None:
         return against
     plane = target.points[points.ravel(), :2]
