@@ -51,7 +51,11 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
         return missing
     # Where there are markers of the board, it is another with such markers, or none.
     only_markers = isinstance(target, Coded) and missing.reason is not Reason.NO_PATTERN
-    shown, markers = next(_visible(image, target, only_markers=only_markers), (None, None))
+    # Where no markers are described, whatever there is need only be told, not measured.
+    small = (
+        image if isinstance(target, Coded) else Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
+    )
+    shown, markers = next(_visible(small, target, only_markers=only_markers), (None, None))
     if shown is None:
         return missing
     if shown != target:
@@ -99,7 +103,8 @@ def _marked(image: Image, target: Target, reading: Reading, fewest: int) -> Iter
 def _chessboard(image: Image, target: Target) -> Iterator[Chessboard]:
     """Yield the chessboard of whatever size, turned as it is described."""
     pitch = target.spacing_m
-    for rows, columns in chessboard.sizes(image):
+    small = Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
+    for rows, columns in chessboard.sizes(small):
         yield _nearest(target, [Chessboard(rows, columns, pitch), Chessboard(columns, rows, pitch)])
 
 
