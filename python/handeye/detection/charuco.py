@@ -15,7 +15,16 @@ from handeye.detection.base import (
     inside,
     ordered,
 )
-from handeye.detection.corner_fit import FEW, WIDE_PX, CornerKind, astray, fit_corners, nearer, spread
+from handeye.detection.corner_fit import (
+    ASTRAY_PX,
+    FEW,
+    WIDE_PX,
+    CornerKind,
+    astray,
+    fit_corners,
+    nearer,
+    spread,
+)
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.marker_lattice import contradiction
 from handeye.detection.markers import (
@@ -36,6 +45,8 @@ FEWEST_CORNERS = 4
 FEWEST_MARKERS = 2
 # Part of a square that the window of a corner may take, and of the way to a marker that its strips may.
 WINDOW_SHARE = 0.7
+# A corner is off from where those around it put it by no more than this share of a square.
+OFF_SHARE = 0.02
 BAND_SHARE = 0.8
 # What the wrong one of two layouts looks like.
 _MAY_BE_LAYOUT = (Reason.INCONSISTENT, Reason.INCOMPLETE)
@@ -115,7 +126,8 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         around = np.concatenate([rough, seen.reshape(-1, 2)])
         expected = from_neighbours(plane, around)[: len(rough)]
         pitches = target.square_m * np.linalg.norm(_steps(rough, places, seen), axis=2).min(axis=1)
-        good = ~astray(rough, expected, pitches)
+        away = np.linalg.norm(rough - expected, axis=1)
+        good = away <= np.maximum(ASTRAY_PX, OFF_SHARE * pitches)
         number = int(good.sum())
         if number >= FEWEST_CORNERS:
             return ordered(target, numbers[good], rough[good])
