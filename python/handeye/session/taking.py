@@ -82,6 +82,7 @@ class Taker:
                 image,
                 seen.timestamp_s,
                 joints if joints is not None else self._joints_of(seen.reading, step.goal),
+                detection.sigmas_px,
             )
             self._store.recording.with_views((*self._store.recording.views, view))
         except HandeyeError as error:
