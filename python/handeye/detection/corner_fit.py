@@ -31,8 +31,8 @@ TOLD_SHARE = 0.02
 # Residuals of a corner are larger than those of most by this factor, and than this share of its contrast,
 # where there is something else.
 MISFIT_RATIO, MISFIT_SHARE = 1.5, 0.04
-# Residuals of a smoothed picture are like their neighbours, so that they count for less: deviations are larger by
-# this factor than independent ones would make them.
+# Residuals of a smoothed picture are like their neighbours, so that they count for less: deviations are
+# larger by this factor than independent ones would make them.
 CORRELATED = 2.0
 
 

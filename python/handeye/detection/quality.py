@@ -1,8 +1,8 @@
 """How well each point was measured: a standard deviation from its own picture and from how all of them lie.
 
-What a point's picture tells (blur, contrast, how obliquely edges cross, how well the fit went) says how good it
-is beside the others; how far all of them are off a flat board seen through a lens says how good they are. The
-fewer the points, the more what is usual counts.
+What a point's picture tells (blur, contrast, how obliquely edges cross, how well the fit went) says how good
+it is beside the others; how far all of them are off a flat board seen through a lens says how good they are.
+The fewer the points, the more what is usual counts.
 """
 
 import numpy as np
@@ -12,14 +12,14 @@ from handeye.detection.base import Detection
 from handeye.types import Target
 from handeye.types.arrays import FloatArray
 
-# Numbers of a homography; a lens adds polynomials of a degree, from so many points for each of their terms on.
+# Numbers of a homography; a lens adds polynomials of a degree, from so many points for each of their terms.
 OF_HOMOGRAPHY, DEGREES, POINTS_PER_TERM = 8, (6, 5, 4, 3), 1.9
 # What is usual counts as so many measurements.
 USUAL_COUNT = 2.0
 # No point is better.
 LEAST_PX = 0.001
-# The largest of the squares are left out, as a few points may lie elsewhere (a larger circle does); the mean of
-# the others of a Gaussian is this share of its variance.
+# The largest of the squares are left out, as a few points may lie elsewhere (a larger circle does); the mean
+# of the others of a Gaussian is this share of its variance.
 TRIMMED, OF_VARIANCE = 0.1, 0.623
 
 
