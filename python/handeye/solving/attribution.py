@@ -93,7 +93,9 @@ def noise_of(
     )
 
 
-def _at_flange(noise: StationNoise, measurements: Measurements, arm: ArmModel | None) -> tuple[float, float]:
+def _at_flange(
+    noise: StationNoise, measurements: Measurements, arm: ArmModel | None
+) -> tuple[float, float]:
     """Deviation per axis of the flange's translation (metres) and rotation (radians), on average over views."""
     positions = np.array([view.T_base_flange.translation for view in measurements.views]).reshape(-1, 3)
     reach = float(np.mean(np.sum(np.square(positions), axis=1)))

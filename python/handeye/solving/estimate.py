@@ -51,7 +51,9 @@ class StationNoise:
 
     def roots(self, mounting: Mounting) -> tuple[FloatArray | None, FloatArray | None]:
         """Square roots (6, 6) of the covariances on the left and on the right of A; None where there is none."""
-        flange, base = (isotropic_root(*side) if any(side) else None for side in (self.flange, self.base))
+        flange, base = (
+            isotropic_root(*side) if any(side) else None for side in (self.flange, self.base)
+        )
         return (flange, base) if mounting is Mounting.EYE_IN_HAND else (base, flange)
 
 
