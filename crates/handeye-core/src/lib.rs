@@ -7,7 +7,7 @@ mod batched_algebra;
 pub mod camera;
 pub mod closed_form;
 pub mod error;
-pub mod evidence;
+pub mod estimation;
 pub mod imaging;
 pub mod information;
 pub mod kinematics;

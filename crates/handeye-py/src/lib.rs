@@ -11,7 +11,7 @@ mod camera;
 mod closed_form;
 mod convert;
 mod errors;
-mod evidence;
+mod estimation;
 mod geometry;
 mod imaging;
 mod information;
@@ -27,7 +27,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     alignment::register(module)?;
     camera::register(module)?;
     closed_form::register(module)?;
-    evidence::register(module)?;
+    estimation::register(module)?;
     geometry::register(module)?;
     kinematics::register(module)?;
     imaging::register(module)?;

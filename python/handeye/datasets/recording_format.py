@@ -12,7 +12,6 @@ four numbers. Unknown fields are errors: a misspelt one must not be silently wit
 """
 
 import os
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from handeye.datasets.corners import corners_text, read_corners
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning, recording_warnings
 from handeye.datasets.reading import MIB, existing_folder, inside, is_file, located, read_text
-from handeye.datasets.toml_text import toml_text
+from handeye.datasets.toml_text import toml_text, toml_values
 from handeye.datasets.writing import copy_file, is_occupied, new_folder, replace_file, write_file
 from handeye.errors import HandeyeError, InputError, OutputError
 from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth, View
@@ -31,9 +30,7 @@ from handeye.types.view import check_view_name
 FORMAT = "handeye-recording"
 VERSION = 1
 FILE_NAME = "recording.toml"
-MAX_BYTES = 4 * MIB
-# A key of very many parts, a.a.a..., takes the reader of TOML hours; no line of ours has nearly as many dots.
-MAX_DOTS_IN_LINE = 300
+MAX_BYTES = 2 * MIB
 
 Rows = list[list[float]]
 
@@ -116,6 +113,49 @@ def read_recording(folder: str | os.PathLike[str]) -> LoadedRecording:
     return LoadedRecording(recording, root, recording_warnings(recording))
 
 
+@dataclass(frozen=True)
+class ViewsApart:
+    """A recording without its views, and each view by its name, or what is wrong with it."""
+
+    recording: Recording
+    views: dict[str, View | InputError]
+
+
+def read_views_apart(folder: str | os.PathLike[str]) -> ViewsApart:
+    """Read a recording of which single views may be damaged; its truth is left out.
+
+    Raises
+    ------
+    InputError
+        The recording cannot be read at all.
+    """
+    root = existing_folder(folder)
+    file = root / FILE_NAME
+    document = _read_document(file)
+    views: dict[str, View | InputError] = {}
+    with located(str(file)):
+        camera = Camera.from_dict(document.camera)
+        target = Target.from_dict(document.target)
+        recording = Recording(document.name, document.mounting, camera, target, (), source=document.source)
+        for view in document.view:
+            try:
+                views[check_view_name(view.name)] = _read_view(view, root, camera)
+            except InputError as error:
+                views[view.name] = error
+    return ViewsApart(recording, views)
+
+
+def write_empty_recording(recording: Recording, folder: Path) -> None:
+    """Write `recording.toml` alone, without views, into a folder that has lost its own.
+
+    Raises
+    ------
+    OutputError
+        The system refuses to write.
+    """
+    replace_file(folder / FILE_NAME, _text(recording.with_views(()), []))
+
+
 def write_recording(
     recording: Recording,
     folder: str | os.PathLike[str],
@@ -156,13 +196,11 @@ def write_recording(
 
 def _read_document(file: Path) -> _RecordingDocument:
     text = read_text(file, MAX_BYTES)
-    if any(line.count(".") > MAX_DOTS_IN_LINE for line in text.split("\n")):
-        raise InputError(f"{file}: a line with more than {MAX_DOTS_IN_LINE} dots", code="not_toml")
     try:
-        data = tomllib.loads(text)
+        data = toml_values(text)
     except (ValueError, RecursionError) as error:
         raise InputError(
-            f"{file}: not TOML: {error}",
+            f"{file}: not TOML: {str(error)[:200]}",
             code="not_toml",
             hint="repair the line, or write the recording again",
         ) from error

@@ -16,6 +16,7 @@ from handeye.detection.base import (
     ordered,
 )
 from handeye.detection.corner_fit import (
+    ASTRAY_PX,
     FEW,
     WIDE_PX,
     CornerFits,
@@ -45,6 +46,8 @@ FEWEST_CORNERS = 4
 FEWEST_MARKERS = 2
 # Part of a square that the window of a corner may take, and of the way to a marker that its strips may.
 WINDOW_SHARE = 0.7
+# A corner is off from where those around it put it by no more than this share of a square.
+OFF_SHARE = 0.02
 BAND_SHARE = 0.8
 # What the wrong one of two layouts looks like.
 _MAY_BE_LAYOUT = (Reason.INCONSISTENT, Reason.INCOMPLETE)
@@ -123,7 +126,8 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         around = np.concatenate([sharp.places[good], seen.reshape(-1, 2)])
         expected = from_neighbours(np.concatenate([plane[good], places.reshape(-1, 2)]), around)[: len(good)]
         pitches = target.square_m * np.linalg.norm(steps[good], axis=2).min(axis=1)
-        good = good[~astray(sharp.places[good], expected, pitches)]
+        away = np.linalg.norm(sharp.places[good] - expected, axis=1)
+        good = good[away <= np.maximum(ASTRAY_PX, OFF_SHARE * pitches)]
         number = len(good)
         if number >= FEWEST_CORNERS:
             return ordered(target, numbers[good], sharp.places[good], sharp.sigmas_px[good])

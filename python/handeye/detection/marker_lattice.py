@@ -60,8 +60,11 @@ class MarkerLattice:
         return rows, columns
 
 
-def lattices_of(reading: Reading) -> list[MarkerLattice]:
-    """Return the markers that lie on one lattice each, the most of them first: several boards may be seen."""
+def lattices_of(reading: Reading, step: float | None = None) -> list[MarkerLattice]:
+    """Return the markers that lie on one lattice each, the most of them first: several boards may be seen.
+
+    The step is the distance of neighbouring places in sides of a marker; None for what the markers tell.
+    """
     centres = reading.corners.mean(axis=1)
     right = (
         reading.corners[:, 1] - reading.corners[:, 0] + reading.corners[:, 2] - reading.corners[:, 3]
@@ -74,7 +77,7 @@ def lattices_of(reading: Reading) -> list[MarkerLattice]:
     steps = np.asarray(np.linalg.solve(both.swapaxes(2, 3), flat.swapaxes(2, 3)), dtype=np.float64)[..., 0]
     away = np.abs(steps).max(axis=2)
     np.fill_diagonal(away, np.inf)
-    unit = float(np.median(away.min(axis=1))) if len(centres) > 1 else 1.0
+    unit = step or (float(np.median(away.min(axis=1))) if len(centres) > 1 else 1.0)
     lattices: list[MarkerLattice] = []
     rest = set(range(len(centres)))
     while rest:
@@ -96,7 +99,8 @@ def contradiction(board: Coded, seen: Seen) -> NotFound | None:
     if len(own) < 2 or len(seen.ids) < 2:
         return None
     reading = Reading(board.dictionary, board.border_bits, False, seen.ids, seen.corners, NO_IDS)
-    lattice = max(lattices_of(reading), key=lambda lattice: np.isin(lattice.ids, own).sum())
+    lattices = lattices_of(reading, board.spacing_m / _marker_m(board))
+    lattice = max(lattices, key=lambda lattice: np.isin(lattice.ids, own).sum())
     others = int((~np.isin(lattice.ids, own)).sum())
     if others >= FEWEST_AGAINST:
         return NotFound(

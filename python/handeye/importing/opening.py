@@ -205,4 +205,6 @@ def _camera(
         return given, CameraOrigin.GIVEN
     if images.camera is not None:
         return images.camera, CameraOrigin.FILES
-    return calibrate_camera(images.target, found, size).camera, CameraOrigin.CALIBRATED
+    camera = calibrate_camera(images.target, found, size).camera
+    of_views = Camera(camera.lens, camera.parameters, *camera.size_px, camera.covariance, from_views=True)
+    return of_views, CameraOrigin.CALIBRATED

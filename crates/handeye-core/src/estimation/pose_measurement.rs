@@ -12,7 +12,7 @@ use crate::se3::Se3;
 /// With free camera parameters the pose is `exp(-sensitivity dc) pose`, and the residual it leaves still says
 /// something of `dc`: information `camera_information` and gradient `camera_gradient`, at a pixel noise of 1 px.
 #[derive(Clone, Debug)]
-pub struct CompressedView {
+pub struct PoseMeasurement {
     /// `A` of the chain.
     pub motion: Se3,
     /// `T_camera_target` of the image alone.
@@ -41,7 +41,7 @@ pub fn compress(
     camera: &Camera,
     pose: &Se3,
     parameters: Option<&PixelParameters>,
-) -> Result<CompressedView, Error> {
+) -> Result<PoseMeasurement, Error> {
     let block = view_block(problem, k, camera, pose, 1.0, parameters).ok_or_else(|| {
         Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
     })?;
@@ -61,7 +61,7 @@ pub fn compress(
         }
     };
     let degrees_of_freedom = (2 * problem.point_count(k)) as f64 - 6.0;
-    Ok(CompressedView {
+    Ok(PoseMeasurement {
         motion: *problem.motion(k),
         pose: *pose,
         covariance,
@@ -77,7 +77,7 @@ pub fn compress(
 ///
 /// Corner noise differs severalfold between views (small, oblique, cluttered); a view's own residual says by how
 /// much, and the others keep a view with few points from fooling itself. Never below `floor_px2`.
-pub fn shrunk_variances(views: &[&CompressedView], prior_degrees: f64, floor_px2: f64) -> Vec<f64> {
+pub fn shrunk_variances(views: &[&PoseMeasurement], prior_degrees: f64, floor_px2: f64) -> Vec<f64> {
     let mut sorted: Vec<f64> = views.iter().map(|v| v.variance_px2).collect();
     sorted.sort_by(f64::total_cmp);
     let n = sorted.len();

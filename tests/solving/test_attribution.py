@@ -7,9 +7,9 @@ import pytest
 
 from cells import Cell
 from handeye.solving import AutoEstimator, Measurements
-from handeye.solving.blame import blame
 from handeye.types import Camera, Chessboard, Mounting, Pose, View
 from handeye.types.arrays import FloatArray
+from handeye.types.calibration import Finding
 
 VIEWS = 14
 
@@ -26,8 +26,14 @@ def measured(cell: Cell, *, base_sigma: float = 0.0, flange_sigma: float = 0.0) 
     return Measurements.of(cell.mounting, camera, cell.target, views)
 
 
+def attribution(measurements: Measurements) -> Finding:
+    finding = AutoEstimator()(measurements).attribution
+    assert finding is not None
+    return finding
+
+
 def verdict(measurements: Measurements) -> str:
-    return blame(measurements, AutoEstimator()(measurements)).code
+    return attribution(measurements).code
 
 
 @pytest.mark.parametrize("mounting", list(Mounting))
@@ -44,7 +50,7 @@ class TestBlame:
         cell = Cell(np.random.default_rng(3), mounting)
         measurements = measured(cell)
         wrong = Measurements.of(mounting, measurements.camera, Chessboard(7, 9, 0.0302), measurements.views)
-        finding = blame(wrong, AutoEstimator()(wrong))
+        finding = attribution(wrong)
         assert finding.code == "blame_board_scale"
         assert re.search(r"0\.6[4-8] % smaller than stated", finding.sentence)
 
@@ -55,7 +61,7 @@ class TestBlame:
         parameters[:4] += [6.0, 6.0, -4.0, 3.0]
         camera = replace_parameters(measurements.camera, parameters)
         wrong = Measurements.of(mounting, camera, cell.target, measurements.views)
-        finding = blame(wrong, AutoEstimator()(wrong))
+        finding = attribution(wrong)
         assert finding.code == "blame_camera"
         assert "fx -6" in finding.sentence or "fx -5" in finding.sentence
 
@@ -75,7 +81,7 @@ class TestBlame:
             seen = cell.view(f"view_{time_s:.2f}", passing(time_s + lag_s), sigma_px=0.1)
             views.append(View(seen.name, passing(time_s), seen.point_ids, seen.pixels, timestamp_s=time_s))
         measurements = Measurements.of(mounting, cell.camera, cell.target, views)
-        finding = blame(measurements, AutoEstimator()(measurements))
+        finding = attribution(measurements)
         assert finding.code == "blame_time_lag"
         assert ("later" if lag_s > 0 else "earlier") in finding.sentence
         found = re.search(r"([0-9.]+) ms", finding.sentence)

@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::chain::WeakPrior;
+use super::start::WeakPrior;
 use super::systems::{eliminate, entries_of, start_of, substitute};
 use super::twists::{exponential, logarithm, product};
 use crate::batched_algebra::{UPPER, load, store, upper};

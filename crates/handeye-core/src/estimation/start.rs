@@ -39,8 +39,26 @@ impl Default for WeakPrior {
 }
 
 impl WeakPrior {
+    /// Information and right-hand side of a twist of `X` at the present `X`.
+    pub(super) fn of_x(&self, x: &Se3) -> (Matrix6<f64>, Vector6<f64>) {
+        let (information, right) = self.normal(x);
+        (information.fixed_view::<6, 6>(0, 0).into_owned(), right.fixed_rows::<6>(0).into_owned())
+    }
+
+    /// Information of a twist of `Y`.
+    pub(super) fn of_y(&self) -> Matrix6<f64> {
+        let (translation, rotation) = (self.y_translation_sigma_m.powi(-2), self.rotation_sigma_rad.powi(-2));
+        Matrix6::from_diagonal(&Vector6::new(
+            translation,
+            translation,
+            translation,
+            rotation,
+            rotation,
+            rotation,
+        ))
+    }
     /// Information and right-hand side of a twist of `X` and `Y` at the present `X`.
-    pub(super) fn normal(&self, x: &Se3) -> (Matrix12, Vector12) {
+    pub(crate) fn normal(&self, x: &Se3) -> (Matrix12, Vector12) {
         let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
         jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
         jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-hat(&x.translation));
