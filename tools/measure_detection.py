@@ -3,6 +3,7 @@
     python tools/measure_detection.py speed
     python tools/measure_detection.py rendered --first 0 --count 200 --rows rows.csv
     python tools/measure_detection.py summary --rows rows.csv
+    python tools/measure_detection.py quality --views 8
     HANDEYE_DATA=... python tools/measure_detection.py public
 
 Times are of one processor; those of `speed` are the least of several, the others medians over the views.
@@ -126,6 +127,55 @@ def speed(views: int) -> None:
             )
 
 
+# Looks under which stated deviations are compared with errors.
+LOOKS: dict[str, dict[str, float]] = {
+    "sharp": {"blur_px": 0.4, "noise": 1.0},
+    "blurred": {"blur_px": 2.0, "noise": 1.0},
+    "noisy": {"blur_px": 0.7, "noise": 6.0},
+    "gamma 0.45": {"blur_px": 0.7, "noise": 2.0, "gamma": 0.45},
+    "gamma 2.2": {"blur_px": 0.7, "noise": 2.0, "gamma": 2.2},
+    "JPEG": {"blur_px": 0.7, "noise": 1.0, "quality": 70},
+}
+
+
+def quality(views: int) -> None:
+    """Print squared errors over stated variances, for each family and look, and median deviations."""
+    print("| target | " + " | ".join(LOOKS) + " | all |\n|---" + "|---" * (len(LOOKS) + 1) + "|")
+    for name, target in TARGETS.items():
+        renderer = BoardRenderer(CAMERA, target, Appearance())
+        cells: list[str] = []
+        everything: list[float] = []
+        for look in LOOKS.values():
+            ratios: list[float] = []
+            sigmas: list[float] = []
+            for view in range(views):
+                random = np.random.default_rng([23, view])
+                pose = posed(target, float(random.uniform(0.25, 0.7)), random)
+                found = detect(taken(renderer.image(pose), look, random), target)
+                if isinstance(found, NotFound) or found.sigmas_px is None:
+                    continue
+                truth = projected(target, pose)
+                squares = [
+                    ((found.pixels - truth[p[found.point_ids]]) ** 2).sum(axis=1) for p in target.symmetries
+                ]
+                ratios.extend(min(squares, key=np.sum) / 2 / found.sigmas_px**2)
+                sigmas.extend(found.sigmas_px)
+            cells.append(f"{np.mean(ratios):.2f} ({np.median(sigmas):.3f} px)")
+            everything.extend(ratios)
+        print(f"| {name} | {' | '.join(cells)} | {np.mean(everything):.2f} |", flush=True)
+
+
+def taken(image: np.ndarray, look: dict[str, float], random: np.random.Generator) -> np.ndarray:
+    """A picture out of focus, as a camera with another gamma and noise gives it, and as JPEG."""
+    grey = cv2.GaussianBlur(image.astype(np.float64), (0, 0), look["blur_px"])
+    grey = 255 * (grey / 255) ** look.get("gamma", 1.0) + random.normal(scale=look["noise"], size=grey.shape)
+    bytes_ = np.rint(grey.clip(0, 255)).astype(np.uint8)
+    if "quality" in look:
+        coded = cv2.imencode(".jpg", bytes_, [cv2.IMWRITE_JPEG_QUALITY, int(look["quality"])])[1]
+        bytes_ = np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
+    return bytes_
+
+
 def rendered(first: int, count: int, file: Path | None) -> None:
     """Print, for some of the rendered views, what was found with and without a prediction, and how well."""
     names = list(TARGETS)
@@ -243,13 +293,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("speed", "rendered", "summary", "public"))
+    parser.add_argument("what", choices=("speed", "rendered", "summary", "quality", "public"))
     parser.add_argument("--first", type=int, default=0, help="number of the first rendered view")
     parser.add_argument("--count", type=int, default=1000, help="number of rendered views")
     parser.add_argument(
         "--rows", type=Path, help="file that rows of rendered views are added to or read from"
     )
-    parser.add_argument("--views", type=int, default=4, help="views per line of the table of speed")
+    parser.add_argument("--views", type=int, default=4, help="views per line of a table")
     options = parser.parse_args()
     cv2.setNumThreads(1)
     if options.what == "speed":
@@ -258,6 +308,8 @@ def main() -> None:
         rendered(options.first, options.count, options.rows)
     elif options.what == "summary":
         summary(options.rows)
+    elif options.what == "quality":
+        quality(options.views)
     else:
         public(Path(os.environ["HANDEYE_DATA"]))
 

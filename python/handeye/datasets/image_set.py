@@ -41,15 +41,17 @@ class Shot:
         check_view_name(self.name)
         check_relative_path(self.image, f"view {self.name}: image")
 
-    def with_points(self, point_ids: ArrayLike, pixels: ArrayLike) -> View:
-        """Return the view with the points (N,) found at pixels (N, 2).
+    def with_points(
+        self, point_ids: ArrayLike, pixels: ArrayLike, sigmas_px: ArrayLike | None = None
+    ) -> View:
+        """Return the view with the points (N,) found at pixels (N, 2), with deviations (N,) in px.
 
         Raises
         ------
         InputError
             As `View`.
         """
-        return View(self.name, self.T_base_flange, point_ids, pixels, image=self.image)
+        return View(self.name, self.T_base_flange, point_ids, pixels, image=self.image, sigmas_px=sigmas_px)
 
 
 @dataclass(frozen=True)

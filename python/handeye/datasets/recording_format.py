@@ -4,7 +4,7 @@
 
     recording.toml      format, version, name, source, mounting, view_count, [camera], [target], [truth],
                         [[view]] ...
-    corners/NAME.csv    id,u_px,v_px
+    corners/NAME.csv    id,u_px,v_px and, where they are known, sigma_px
     images/NAME.png     optional
 
 Lengths in metres, angles in radians, pixels with their centres at whole numbers; transforms as four rows of
@@ -224,7 +224,7 @@ def _read_view(document: _ViewDocument, root: Path, camera: Camera) -> View:
     where = f"view {check_view_name(document.name)}"
     with located(f"{where}: T_base_flange"):
         T_base_flange = Pose(document.T_base_flange)
-    ids, pixels = read_corners(inside(root, document.corners, f"{where}: corners"))
+    ids, pixels, sigmas = read_corners(inside(root, document.corners, f"{where}: corners"))
     view = View(
         document.name,
         T_base_flange,
@@ -233,6 +233,7 @@ def _read_view(document: _ViewDocument, root: Path, camera: Camera) -> View:
         document.image,
         document.timestamp_s,
         document.joints_rad,
+        sigmas,
     )
     if view.image is not None:
         size = image_size(inside(root, view.image, f"{where}: image"))

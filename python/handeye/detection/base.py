@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from handeye.errors import DetectionError, InputError
 from handeye.types import Target
-from handeye.types.arrays import FloatArray, IndexArray, finite_array, index_array
+from handeye.types.arrays import FloatArray, IndexArray, deviations, finite_array, index_array
 from handeye.types.target import Coded
 
 _Board = TypeVar("_Board", bound=Target)
@@ -29,6 +29,8 @@ class Detection:
     pixels
         (N, 2) where they are: u to the right, v down, pixel centres at whole numbers. A circle is where the
         area centroid of its image is, not the image of its centre.
+    sigmas_px
+        (N,) standard deviation of one coordinate of each point, in pixels; None if unknown.
     note
         What about the board is not as described, though its points are.
 
@@ -40,9 +42,16 @@ class Detection:
 
     point_ids: IndexArray
     pixels: FloatArray
+    sigmas_px: FloatArray | None
     note: str
 
-    def __init__(self, point_ids: ArrayLike, pixels: ArrayLike, note: str = "") -> None:
+    def __init__(
+        self,
+        point_ids: ArrayLike,
+        pixels: ArrayLike,
+        sigmas_px: ArrayLike | None = None,
+        note: str = "",
+    ) -> None:
         ids = index_array(point_ids, "detection: point_ids")
         values = finite_array(pixels, (None, 2), "detection: pixels")
         if len(ids) == 0 or len(ids) != len(values) or len(np.unique(ids)) != len(ids):
@@ -53,10 +62,16 @@ class Detection:
             )
         object.__setattr__(self, "point_ids", ids)
         object.__setattr__(self, "pixels", values)
+        sigmas = None if sigmas_px is None else deviations(sigmas_px, len(ids), "detection")
+        object.__setattr__(self, "sigmas_px", sigmas)
         object.__setattr__(self, "note", note)
 
     def __len__(self) -> int:
         return len(self.point_ids)
+
+    def with_sigmas(self, sigmas_px: FloatArray) -> "Detection":
+        """Return the detection with other standard deviations (N,)."""
+        return replace(self, sigmas_px=sigmas_px)
 
 
 class Reason(StrEnum):
@@ -128,18 +143,30 @@ def relabeled(detection: Detection, permutation: IndexArray) -> Detection:
     return replace(detection, point_ids=permutation[detection.point_ids])
 
 
-def ordered(target: Target, point_ids: ArrayLike, pixels: ArrayLike) -> Detection:
+def ordered(
+    target: Target, point_ids: ArrayLike, pixels: ArrayLike, sigmas_px: ArrayLike | None = None
+) -> Detection:
     """Return a detection in the order of the points' ids.
 
     Where the target has symmetries the picture cannot tell its labelings apart; the one is taken whose x axis
     points furthest to the right in the image, so that views without much roll agree.
     """
-    detection = Detection(point_ids, pixels)
+    detection = Detection(point_ids, pixels, sigmas_px)
     if len(target.symmetries) > 1:
         named = (relabeled(detection, permutation) for permutation in target.symmetries)
         detection = max(named, key=lambda candidate: x_axis(target, candidate)[0])
-    order = np.argsort(detection.point_ids)
-    return Detection(detection.point_ids[order], detection.pixels[order])
+    return chosen(detection, np.argsort(detection.point_ids))
+
+
+def chosen(detection: Detection, which: IndexArray) -> Detection:
+    """Return a detection with some of the points, in that order."""
+    sigmas = detection.sigmas_px
+    return replace(
+        detection,
+        point_ids=detection.point_ids[which],
+        pixels=detection.pixels[which],
+        sigmas_px=None if sigmas is None else sigmas[which],
+    )
 
 
 def x_axis(target: Target, detection: Detection) -> FloatArray:

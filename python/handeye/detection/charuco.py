@@ -15,9 +15,19 @@ from handeye.detection.base import (
     inside,
     ordered,
 )
-from handeye.detection.corner_fit import FEW, WIDE_PX, CornerKind, astray, fit_corners, nearer, spread
+from handeye.detection.corner_fit import (
+    ASTRAY_PX,
+    FEW,
+    WIDE_PX,
+    CornerFits,
+    CornerKind,
+    astray,
+    corner_fits,
+    nearer,
+    spread,
+)
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.marker_lattice import beside
+from handeye.detection.marker_lattice import contradiction
 from handeye.detection.markers import (
     LEAST_SHARE,
     Bits,
@@ -36,6 +46,8 @@ FEWEST_CORNERS = 4
 FEWEST_MARKERS = 2
 # Part of a square that the window of a corner may take, and of the way to a marker that its strips may.
 WINDOW_SHARE = 0.7
+# A corner is off from where those around it put it by no more than this share of a square.
+OFF_SHARE = 0.02
 BAND_SHARE = 0.8
 # What the wrong one of two layouts looks like.
 _MAY_BE_LAYOUT = (Reason.INCONSISTENT, Reason.INCOMPLETE)
@@ -91,7 +103,7 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
     if not len(markers):
         return diagnose(image, NotFound(Reason.NO_PATTERN, f"no marker of the board, of {target.dictionary}"))
     places = target.outlines[markers]
-    against = disagreement(places, seen) or beside(target, seen_markers)
+    against = disagreement(places, seen) or contradiction(target, seen_markers)
     if against is not None:
         return against
     # OpenCV gives None where it finds nothing, whatever its types say.
@@ -100,25 +112,25 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         corners = np.asarray(found, dtype=np.float64).reshape(-1, 2)
         numbers = np.asarray(found_ids, dtype=np.int64).ravel()
         steps = _steps(corners, places, seen)
-        rough = _measured(image, target, corners, steps, rough=True)
+        rough = _measured(image, target, corners, steps, rough=True).places
         good = np.isfinite(rough).all(axis=1)
-        numbers, rough = numbers[good], rough[good]
+        numbers, rough, steps = numbers[good], rough[good], steps[good]
         # Once more: all corners together tell the directions of edges better than a marker does.
         plane = target.points[numbers, :2]
         lens = _core.PlaneMap.fitted(plane, rough) if len(rough) >= FEWEST_CORNERS else None
         if lens is not None:
-            rough = _measured(image, target, rough, lens.steps(plane, 0.1 * target.square_m))
-        good = np.isfinite(rough).all(axis=1)
-        numbers, rough = numbers[good], rough[good]
+            steps = lens.steps(plane, 0.1 * target.square_m)
+        sharp = _measured(image, target, rough, steps)
+        good = np.flatnonzero(~sharp.spoilt())
         # What lies in front of the board has edges, too: markers and corners around know better.
-        plane = np.concatenate([target.points[numbers, :2], places.reshape(-1, 2)])
-        around = np.concatenate([rough, seen.reshape(-1, 2)])
-        expected = from_neighbours(plane, around)[: len(rough)]
-        pitches = target.square_m * np.linalg.norm(_steps(rough, places, seen), axis=2).min(axis=1)
-        good = ~astray(rough, expected, pitches)
-        number = int(good.sum())
+        around = np.concatenate([sharp.places[good], seen.reshape(-1, 2)])
+        expected = from_neighbours(np.concatenate([plane[good], places.reshape(-1, 2)]), around)[: len(good)]
+        pitches = target.square_m * np.linalg.norm(steps[good], axis=2).min(axis=1)
+        away = np.linalg.norm(sharp.places[good] - expected, axis=1)
+        good = good[away <= np.maximum(ASTRAY_PX, OFF_SHARE * pitches)]
+        number = len(good)
         if number >= FEWEST_CORNERS:
-            return ordered(target, numbers[good], rough[good])
+            return ordered(target, numbers[good], sharp.places[good], sharp.sigmas_px[good])
     return NotFound(
         Reason.INCOMPLETE,
         f"{number} of {target.point_count} corners by {len(markers)} markers; {FEWEST_CORNERS} are needed",
@@ -145,14 +157,16 @@ def confirm(image: Image, target: Charuco, board: Aligned) -> Detection | None:
     steps = board.steps(plane)
     band = BAND_SHARE * (target.square_m - target.marker_m) / 2 * np.linalg.norm(steps, axis=2).min()
     some = spread(len(corners), FEW if band >= WIDE_PX else len(corners))
-    near = _measured(image, target, corners[some], steps[some], rough=True)
+    near = _measured(image, target, corners[some], steps[some], rough=True).places
     # Then it is known well enough where all are, so that where they were put matters no more.
     again, steps = nearer(plane, corners, steps, some, near)
     sharp = _measured(image, target, again, steps)
-    good = ~astray(sharp, corners, target.square_m * np.linalg.norm(steps, axis=2).min(axis=1))
+    good = ~sharp.spoilt() & ~astray(
+        sharp.places, corners, target.square_m * np.linalg.norm(steps, axis=2).min(axis=1)
+    )
     if good.sum() < max(FEWEST_CORNERS, LEAST_SHARE * seen.sum()):
         return None
-    return ordered(target, ids[good], sharp[good])
+    return ordered(target, ids[good], sharp.places[good], sharp.sigmas_px[good])
 
 
 def _steps(corners: FloatArray, places: FloatArray, markers: FloatArray) -> FloatArray:
@@ -170,14 +184,14 @@ def _steps(corners: FloatArray, places: FloatArray, markers: FloatArray) -> Floa
 
 def _measured(
     image: Image, target: Charuco, corners: FloatArray, steps: FloatArray, rough: bool = False
-) -> FloatArray:
-    """Return the corners (N, 2) as fitted, NaN where that fails."""
+) -> CornerFits:
+    """Return the corners (N) as fitted."""
     lengths = np.linalg.norm(steps, axis=2)
     directions = steps / lengths[:, :, np.newaxis]
     sine = np.abs(np.linalg.det(directions))
     scale = lengths.min(axis=1) * sine  # pixels per metre across the edges
     free = (target.square_m - target.marker_m) / 2
-    return fit_corners(
+    return corner_fits(
         image,
         corners,
         directions,

@@ -108,10 +108,10 @@ def confirm(image: Image, target: Chessboard, board: Aligned) -> Detection | Non
     if board.likeness(plane).min() < LEAST_LIKENESS or goes_on(target, board):
         return None
     places = board.places(plane)
-    corners = _fitted(image, target, places).places
-    if astray(corners, places, _edges(target, places).heights).any():
+    fits = _fitted(image, target, places)
+    if astray(fits.places, places, _edges(target, places).heights).any():
         return None
-    return ordered(target, np.arange(target.point_count), corners)
+    return ordered(target, np.arange(target.point_count), fits.places, fits.sigmas_px)
 
 
 def _measured(image: Image, target: Chessboard, corners: FloatArray) -> Detection | NotFound:
@@ -128,7 +128,7 @@ def _measured(image: Image, target: Chessboard, corners: FloatArray) -> Detectio
         return NotFound(
             Reason.INCOMPLETE, f"only {len(good)} of {target.point_count} corners can be measured"
         )
-    return ordered(target, good, fitted[good])
+    return ordered(target, good, fitted[good], fits.sigmas_px[good])
 
 
 def _fitted(image: Image, target: Chessboard, corners: FloatArray) -> CornerFits:

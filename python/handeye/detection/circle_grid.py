@@ -11,7 +11,7 @@ from handeye import _core
 from handeye.detection.base import Detection, Image, NotFound, Reason, ordered
 from handeye.detection.beyond import goes_on
 from handeye.detection.blobs import Spots, areas, find_spots
-from handeye.detection.centroid import area_centroids, gaps
+from handeye.detection.centroid import area_centroids, gaps, sigmas_px
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.lattice import Placement, grow, placements
 from handeye.detection.part import Part
@@ -79,7 +79,8 @@ def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | Non
         spots[ids[good]] = np.flatnonzero(good)
         if _marked_ratio(target, spots, found.shapes) < MARKED_RATIO:
             return None
-    return ordered(target, ids[good], found.centres[good])
+    kept = found.take(np.flatnonzero(good))
+    return ordered(target, ids[good], kept.centres, sigmas_px(image, kept))
 
 
 def _measure_first(image: Image, expected: Spots, which: int) -> None:
@@ -198,7 +199,8 @@ def _measured(
                 Reason.INCONSISTENT, "no circle where the marked one may be is larger than the others"
             )
     ids = np.flatnonzero((chosen >= 0) & good[chosen])
-    return ordered(target, ids, pixels[chosen[ids]])
+    kept = Spots(pixels[chosen[ids]], shapes[chosen[ids]])
+    return ordered(target, ids, kept.centres, sigmas_px(image, kept))
 
 
 def _marked_ratio(target: CircleGrid, chosen: IndexArray, shapes: FloatArray) -> float:

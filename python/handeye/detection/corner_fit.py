@@ -30,7 +30,10 @@ TOLD_SHARE = 0.02
 
 # Residuals of a corner are larger than those of most by this factor, and than this share of its contrast,
 # where there is something else.
-MISFIT_RATIO, MISFIT_SHARE = 1.5, 0.03
+MISFIT_RATIO, MISFIT_SHARE = 1.5, 0.04
+# Residuals of a smoothed picture are like their neighbours, so that they count for less: deviations are
+# larger by this factor than independent ones would make them.
+CORRELATED = 2.0
 
 
 class CornerKind(Enum):
@@ -99,6 +102,11 @@ class CornerFits:
     spreads: FloatArray
     misfits: FloatArray
     contrasts: FloatArray
+
+    @property
+    def sigmas_px(self) -> FloatArray:
+        """(N,) standard deviations of the places, of one coordinate."""
+        return CORRELATED * self.misfits * np.sqrt(np.trace(self.spreads, axis1=1, axis2=2) / 2)
 
     def spoilt(self) -> NDArray[np.bool_]:
         """Tell which corners (N,) were not fitted, or not as well as the others: a shadow's edge or glare."""

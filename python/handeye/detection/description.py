@@ -24,6 +24,8 @@ SEARCH_SIDE_PX = 1000
 FEWEST_MARKERS = 4
 # Share of the circles of a grid that must be there, the fewest that are a grid, and the most.
 FILLED, FEWEST_CIRCLES, MOST_CIRCLES = 0.9, 9, 10_000
+# An outermost line of a grid has at least so many of the circles that others have.
+FULL_LINE = 0.5
 # What lengths are taken from where no board is described.
 UNKNOWN = Chessboard(7, 10, 0.02)
 # What a picture says for itself, whatever the board.
@@ -47,12 +49,13 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
     """
     if missing.reason in _OF_THE_PICTURE or missing.reason is Reason.REPEATED:
         return missing
-    if isinstance(target, Coded) and missing.reason is not Reason.NO_PATTERN:
-        # There are markers of the board: it is another with such markers, or none.
-        boards = _marked(image, target, 1)
-    else:
-        boards = _visible(image, target)
-    shown, markers = next(iter(boards), (None, None))
+    # Where there are markers of the board, it is another with such markers, or none.
+    only_markers = isinstance(target, Coded) and missing.reason is not Reason.NO_PATTERN
+    # Where no markers are described, whatever there is need only be told, not measured.
+    small = (
+        image if isinstance(target, Coded) else Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
+    )
+    shown, markers = next(_visible(small, target, only_markers=only_markers), (None, None))
     if shown is None:
         return missing
     if shown != target:
@@ -71,32 +74,37 @@ def shown_board(image: Image) -> Target | None:
 
 
 def _visible(
-    image: Image, target: Target, fewest_markers: int = FEWEST_MARKERS
+    image: Image, target: Target, fewest_markers: int = FEWEST_MARKERS, *, only_markers: bool = False
 ) -> Iterator[tuple[Target, Reading | None]]:
     """Yield boards that an image shows, those of the family described first, and their markers."""
-    # Markers first: between them there are squares, too.
-    yield from _marked(image, target, 1 if isinstance(target, Coded) else fewest_markers)
+    # Markers first: what lies between them looks like squares, too.
+    reading = read_markers(image)
+    if reading is not None:
+        fewest = 1 if isinstance(target, Coded) else fewest_markers
+        yield from ((board, reading) for board in _marked(image, target, reading, fewest))
+        if len(reading.ids) >= FEWEST_MARKERS:
+            return
+    if only_markers:
+        return
     without_markers = (_chessboard, _circle_grid)
     for look in without_markers[::-1] if isinstance(target, CircleGrid) else without_markers:
         for board in look(image, target):
             yield board, None
 
 
-def _marked(image: Image, target: Target, fewest: int) -> Iterator[tuple[Target, Reading]]:
-    reading = read_markers(image)
-    if reading is None:
-        return
+def _marked(image: Image, target: Target, reading: Reading, fewest: int) -> Iterator[Target]:
+    """Yield boards with so many markers at least that have those that were read."""
     height, width = image.shape
     for lattice in lattices_of(reading):
         if len(lattice.ids) >= fewest:
-            for board in boards_like(target, lattice, (width, height)):
-                yield board, reading
+            yield from boards_like(target, lattice, (width, height))
 
 
 def _chessboard(image: Image, target: Target) -> Iterator[Chessboard]:
     """Yield the chessboard of whatever size, turned as it is described."""
     pitch = target.spacing_m
-    for rows, columns in chessboard.sizes(image):
+    small = Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
+    for rows, columns in chessboard.sizes(small):
         yield _nearest(target, [Chessboard(rows, columns, pitch), Chessboard(columns, rows, pitch)])
 
 
@@ -115,7 +123,18 @@ def _circle_grid(image: Image, target: Target) -> Iterator[Target]:
                 return
 
 
+def _trimmed(places: IndexArray) -> IndexArray:
+    """Return places (N, 2) without outermost lines that hardly anything is on: spots beside the grid."""
+    for _ in range(2):
+        for axis in (0, 1):
+            values, counts = np.unique(places[:, axis], return_counts=True)
+            full = values[counts >= FULL_LINE * np.median(counts)]
+            places = places[(places[:, axis] >= full.min()) & (places[:, axis] <= full.max())]
+    return places - places.min(axis=0)
+
+
 def _symmetric(places: IndexArray, target: Target) -> list[CircleGrid]:
+    places = _trimmed(places)
     columns, rows = (np.ptp(places, axis=0) + 1).tolist()
     if len(places) < FILLED * rows * columns:
         return []
@@ -127,13 +146,13 @@ def _asymmetric(places: IndexArray, target: Target) -> list[CircleGrid]:
     x = places[:, 0] - places[:, 1]
     y = places[:, 0] + places[:, 1]
     grids: list[CircleGrid] = []
-    turned = np.column_stack([x - x.min(), y - y.min()])
+    turned = _trimmed(np.column_stack([x, y]))
     for _ in range(4):
         width, rows = (turned.max(axis=0) + 1).tolist()
         columns = width // 2
         # Unshifted rows begin at the left, shifted ones end at the right.
         right = (turned[:, 0] % 2 == turned[:, 1] % 2).all() and width == 2 * columns
-        if right and min(rows, columns) >= 2 and len(places) >= FILLED * rows * columns:
+        if right and min(rows, columns) >= 2 and len(turned) >= FILLED * rows * columns:
             grids.append(_circles(target, rows, columns, asymmetric=True))
         turned = np.column_stack([turned[:, 1].max() - turned[:, 1], turned[:, 0]])
     return grids

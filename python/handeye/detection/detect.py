@@ -11,6 +11,7 @@ from handeye.detection import charuco, chessboard, circle_grid, tags
 from handeye.detection.base import Detection, Image, NotFound, Reason, upright
 from handeye.detection.description import explained
 from handeye.detection.predicted import Prediction, where_expected
+from handeye.detection.quality import scaled
 from handeye.detection.registration import Aligned
 from handeye.errors import InputError
 from handeye.types import Charuco, Chessboard, CircleGrid, Target
@@ -18,7 +19,7 @@ from handeye.types.target import MarkerCorners
 
 SMALLEST_SIDE_PX = 24
 # To be raised with every change of what is detected, or where.
-VERSION = 5
+VERSION = 6
 
 
 @dataclass(frozen=True)
@@ -81,10 +82,12 @@ def detect(image: Image, target: Target, *, predicted: Prediction | None = None)
     if predicted is not None:
         found = _where_predicted(whole, positive, kind, predicted)
         if found is not None:
-            return found
+            return scaled(target, found)
     try:
         found = kind.find(whole, positive)
-        return explained(image, target, found) if isinstance(found, NotFound) else found
+        if isinstance(found, NotFound):
+            found = explained(image, target, found)
+        return scaled(target, found) if isinstance(found, Detection) else found
     except cv2.error as error:
         # OpenCV asserts on some contents; to the caller that is one image without a target, not a crash.
         return NotFound(Reason.DETECTOR_FAILED, f"OpenCV: {str(error).strip()[:200]}")

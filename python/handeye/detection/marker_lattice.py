@@ -26,8 +26,8 @@ AGREEING, COMPLETE = 0.9, 0.6
 MORE_COLUMNS = 3
 # Markers that show a chequered lattice, and places around one that should be in the picture, too.
 FEWEST_OF_CHARUCO, ROOM = 3, 0.6
-# Markers beside a board that say that it is larger.
-FEWEST_BESIDE = 2
+# Markers that speak against a board; one may have been misread.
+FEWEST_AGAINST = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +60,11 @@ class MarkerLattice:
         return rows, columns
 
 
-def lattices_of(reading: Reading) -> list[MarkerLattice]:
-    """Return the markers that lie on one lattice each, the most of them first: several boards may be seen."""
+def lattices_of(reading: Reading, step: float | None = None) -> list[MarkerLattice]:
+    """Return the markers that lie on one lattice each, the most of them first: several boards may be seen.
+
+    The step is the distance of neighbouring places in sides of a marker; None for what the markers tell.
+    """
     centres = reading.corners.mean(axis=1)
     right = (
         reading.corners[:, 1] - reading.corners[:, 0] + reading.corners[:, 2] - reading.corners[:, 3]
@@ -74,7 +77,7 @@ def lattices_of(reading: Reading) -> list[MarkerLattice]:
     steps = np.asarray(np.linalg.solve(both.swapaxes(2, 3), flat.swapaxes(2, 3)), dtype=np.float64)[..., 0]
     away = np.abs(steps).max(axis=2)
     np.fill_diagonal(away, np.inf)
-    unit = float(np.median(away.min(axis=1))) if len(centres) > 1 else 1.0
+    unit = step or (float(np.median(away.min(axis=1))) if len(centres) > 1 else 1.0)
     lattices: list[MarkerLattice] = []
     rest = set(range(len(centres)))
     while rest:
@@ -86,22 +89,40 @@ def lattices_of(reading: Reading) -> list[MarkerLattice]:
     return sorted(lattices, key=lambda lattice: -len(lattice.ids))
 
 
-def beside(board: Coded, seen: Seen) -> NotFound | None:
-    """Return word of markers that continue a board but are not on it, so that it is another; else None.
+def contradiction(board: Coded, seen: Seen) -> NotFound | None:
+    """Return word of markers that lie on the grid of a board, but not as they would on it; else None.
 
-    Markers elsewhere in the picture are those of another board, and no matter.
+    They may be on the board in another place, so that its rows have another length, or not on it at all, so
+    that it is larger or begins elsewhere. Markers elsewhere in the picture are those of another board.
     """
     own = board.marker_ids
-    if len(own) < 2 or (~np.isin(seen.ids, own)).sum() < FEWEST_BESIDE:
+    if len(own) < 2 or len(seen.ids) < 2:
         return None
     reading = Reading(board.dictionary, board.border_bits, False, seen.ids, seen.corners, NO_IDS)
-    lattice = max(lattices_of(reading), key=lambda lattice: np.isin(lattice.ids, own).sum())
+    lattices = lattices_of(reading, board.spacing_m / _marker_m(board))
+    lattice = max(lattices, key=lambda lattice: np.isin(lattice.ids, own).sum())
     others = int((~np.isin(lattice.ids, own)).sum())
-    if others < max(FEWEST_BESIDE, (1 - AGREEING) * len(lattice.ids)):
-        return None
-    return NotFound(
-        Reason.INCONSISTENT, f"{others} markers beside those of the board described continue its grid"
+    if others >= FEWEST_AGAINST:
+        return NotFound(
+            Reason.INCONSISTENT, f"{others} markers beside those of the board described continue its grid"
+        )
+    offsets = _offsets(board, lattice)
+    off = (
+        0 if not len(offsets) else len(offsets) - int(np.unique(offsets, axis=0, return_counts=True)[1].max())
     )
+    if off >= FEWEST_AGAINST:
+        return NotFound(
+            Reason.INCONSISTENT, f"{off} of {len(offsets)} markers lie elsewhere than on the board described"
+        )
+    return None
+
+
+def _offsets(board: Coded, lattice: MarkerLattice) -> IndexArray:
+    """Return how far (K, 2) the markers that a board has are from where they are seen, in places."""
+    index = {number: m for m, number in enumerate(board.marker_ids.tolist())}
+    seen = [k for k, number in enumerate(lattice.ids.tolist()) if number in index]
+    which = np.array([index[int(lattice.ids[k])] for k in seen], dtype=np.int64)
+    return _places(board)[which] - lattice.places[seen]
 
 
 def _grown(first: int, steps: FloatArray, away: FloatArray) -> dict[int, IndexArray]:
@@ -134,11 +155,9 @@ def _has(board: Coded, lattice: MarkerLattice, image_size: tuple[int, int]) -> b
         Width and height in pixels.
     """
     own = _places(board)
-    index = {number: m for m, number in enumerate(board.marker_ids.tolist())}
-    seen = [k for k, number in enumerate(lattice.ids.tolist()) if number in index]
-    if len(seen) < AGREEING * len(lattice.ids):
+    offsets = _offsets(board, lattice)
+    if len(offsets) < AGREEING * len(lattice.ids):
         return False
-    offsets = own[[index[int(lattice.ids[k])] for k in seen]] - lattice.places[seen]
     values, counts = np.unique(offsets, axis=0, return_counts=True)
     if counts.max() < AGREEING * len(lattice.ids):
         return False

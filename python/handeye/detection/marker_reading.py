@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import repeat
 
 import cv2
 import numpy as np
@@ -25,6 +26,8 @@ LEAST_CONTRAST = 12.0
 BORDER_ERRORS, CORRECTION = 0.06, 0.6
 # Fewer markers than these may be chance where a dictionary has so few bits.
 FEWEST, FEWEST_OF_FOUR = 1, 3
+# Unless one is as large as this, as a share of the image.
+LARGE_SHARE = 0.08
 # Corners of outlines are off by so many pixels, or this share of a side.
 NEAR_PX, NEAR_SHARE = 5, 0.08
 _ENOUGH = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 20, 0.05)
@@ -33,6 +36,8 @@ _ENOUGH = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 20, 0.05)
 WINDOWS_PX, THRESHOLD, STRAIGHT = (3, 13, 23), 7, 0.03
 # What is seen at several thresholds is one.
 SAME_PX, SAME_SIZES, MOST_QUADS = 4.0, 8, 1500
+# Thinner ink, dark or light, parts markers from squares that touch them, as Kalibr prints them.
+THINNED = ((cv2.dilate, 1), (cv2.dilate, 3), (cv2.erode, 3), (cv2.dilate, 5), (cv2.erode, 5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,24 +66,58 @@ class Reading:
 
 def read_markers(image: Image) -> Reading | None:
     """Return the markers of the dictionary that most of them are of; None where there are none."""
+    readings = dict[tuple[str, int, bool], Reading]()
     best: Reading | None = None
-    kernel = np.ones((3, 3), dtype=np.uint8)
-    # Thinner ink, dark or light, parts markers from squares that touch them.
-    for change in (None, cv2.dilate, cv2.erode):
-        changed = image if change is None else np.asarray(change(image, kernel), dtype=np.uint8)
+    for change, size in THINNED:
+        kernel = np.ones((size, size), dtype=np.uint8)
+        changed = image if size == 1 else np.asarray(change(image, kernel), dtype=np.uint8)
         for reading in _readings(changed):
-            if best is None or len(reading.ids) > len(best.ids):
-                best = reading
-        if best is not None and len(best.ids) >= 2 * FEWEST_OF_FOUR:
+            kind = reading.dictionary, reading.border_bits, reading.inverted
+            readings[kind] = _together(readings[kind], reading) if kind in readings else reading
+        best = max(map(_outermost, readings.values(), repeat(readings)), key=_weight, default=None)
+        if best is not None and best.border_bits == 1 and len(best.ids) >= 2 * FEWEST_OF_FOUR:
             break
     return None if best is None else replace(best, corners=_sharpened(image, best.corners))
 
 
+def _weight(reading: Reading) -> int:
+    return len(reading.ids)
+
+
+def _outermost(reading: Reading, others: dict[tuple[str, int, bool], Reading]) -> Reading:
+    """Return a reading without markers that have a wider border.
+
+    Thresholds draw a line inside of a wide border, too, and there the marker has a border of one bit.
+    """
+    wider = others.get((reading.dictionary, 2, reading.inverted))
+    if reading.border_bits == 2 or wider is None:
+        return reading
+    size = dict(zip(wider.ids.tolist(), _sides(wider.corners).tolist(), strict=True))
+    sides = zip(reading.ids.tolist(), _sides(reading.corners).tolist(), strict=True)
+    kept = np.array([side > size.get(number, 0.0) for number, side in sides], dtype=np.bool_)
+    return replace(reading, ids=reading.ids[kept], corners=reading.corners[kept])
+
+
+def _sides(corners: FloatArray) -> FloatArray:
+    """Return the length (M,) of the shortest side of markers (M, 4, 2)."""
+    return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min(axis=1))
+
+
+def _together(first: Reading, second: Reading) -> Reading:
+    """Return what was read twice, each marker where it was read first."""
+    new = ~np.isin(second.ids, first.ids)
+    return replace(
+        first,
+        ids=np.concatenate([first.ids, second.ids[new]]),
+        corners=np.concatenate([first.corners, second.corners[new]]),
+        repeated=np.union1d(first.repeated, second.repeated),
+    )
+
+
 def _sharpened(image: Image, corners: FloatArray) -> FloatArray:
     """Return corners (M, 4, 2) nearer to where edges meet: an outline is rounded, and inside of it."""
-    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min(axis=1)
     sharp = np.empty_like(corners)
-    for marker, side in enumerate(sides.tolist()):
+    for marker, side in enumerate(_sides(corners).tolist()):
         window = int(np.clip(NEAR_SHARE * side, 2, NEAR_PX))
         near = corners[marker].reshape(-1, 1, 2).astype(np.float32)
         found = cv2.cornerSubPix(image, near, (window, window), (-1, -1), _ENOUGH)
@@ -88,6 +127,7 @@ def _sharpened(image: Image, corners: FloatArray) -> FloatArray:
 
 def _readings(image: Image) -> Iterator[Reading]:
     quads = _quads(image)
+    large = LARGE_SHARE * max(image.shape)
     if not len(quads):
         return
     for border in (1, 2):
@@ -102,17 +142,21 @@ def _readings(image: Image) -> Iterator[Reading]:
             for inverted in (False, True):
                 fits = (high - low >= LEAST_CONTRAST) & ((1 - share if inverted else share) <= BORDER_ERRORS)
                 codes = light[fits, border:-border, border:-border] != inverted
-                yield from _of_dictionaries(codes.astype(np.uint8), quads[fits], bits, border, inverted)
+                yield from _of_dictionaries(
+                    codes.astype(np.uint8), quads[fits], bits, border, inverted, large
+                )
 
 
 def _of_dictionaries(
-    codes: Image, quads: FloatArray, bits: int, border: int, inverted: bool
+    codes: Image, quads: FloatArray, bits: int, border: int, inverted: bool, large: float
 ) -> Iterator[Reading]:
     for name in LARGEST:
         if marker_bits(name) != bits or not len(codes):
             continue
         exact = _identified(codes, quads, name, 0.0)
-        if len(exact[0]) >= (FEWEST_OF_FOUR if bits == 4 else FEWEST):
+        if len(exact[0]) >= (FEWEST_OF_FOUR if bits == 4 else FEWEST) or (
+            len(exact[0]) and _sides(exact[1]).max() >= large
+        ):
             yield Reading(name, border, inverted, *_identified(codes, quads, name, CORRECTION))
 
 

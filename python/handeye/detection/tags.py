@@ -11,14 +11,16 @@ from handeye.detection.corner_fit import (
     ASTRAY_PX,
     FEW,
     WIDE_PX,
+    CornerFits,
     CornerKind,
     astray,
-    fit_corners,
+    corner_fits,
     nearer,
     spread,
 )
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.marker_lattice import beside
+from handeye.detection.edge_shift import without_edge_shift
+from handeye.detection.marker_lattice import contradiction
 from handeye.detection.markers import (
     LEAST_SHARE,
     NO_IDS,
@@ -63,7 +65,7 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
         return diagnose(image, NotFound(Reason.NO_PATTERN, f"no marker of the board, of {target.dictionary}"))
     seen = seen[:, target.corner_order]
     points = tags[:, np.newaxis] * 4 + np.arange(4)
-    against = disagreement(target.points[points, :2], seen) or beside(target, markers)
+    against = disagreement(target.points[points, :2], seen) or contradiction(target, markers)
     if against is not None:
         return against
     plane = target.points[points.ravel(), :2]
@@ -72,20 +74,22 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
     astray = np.linalg.norm(expected - seen.reshape(-1, 2), axis=1) > ASTRAY_PX
     seen = np.where(astray[:, np.newaxis], expected, seen.reshape(-1, 2)).reshape(-1, 4, 2)
     side = _side(target)
-    rough = _measured(image, target, tags, seen, None, rough=True)
+    rough = _measured(image, target, tags, seen, None, rough=True).places
     good = np.flatnonzero(np.isfinite(rough[:, 0]))
     lens = _core.PlaneMap.fitted(plane[good], rough[good]) if len(good) >= 4 else None
     if lens is None:
         return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
     # Once more: all corners together tell the directions of edges better than a tag does.
     again = np.where(np.isfinite(rough), rough, seen.reshape(-1, 2)).reshape(-1, 4, 2)
-    sharp = _measured(image, target, tags, again, lens.steps(plane, 0.1 * side))
-    good = np.flatnonzero(np.isfinite(rough[:, 0]) & np.isfinite(sharp[:, 0]))
-    expected = from_neighbours(plane[good], sharp[good])
-    good = good[np.linalg.norm(expected - sharp[good], axis=1) <= ASTRAY_PX]
+    steps = lens.steps(plane, 0.1 * side)
+    fits = _measured(image, target, tags, again, steps)
+    good = np.flatnonzero(np.isfinite(rough[:, 0]) & ~fits.spoilt())
+    expected = from_neighbours(plane[good], fits.places[good])
+    good = good[np.linalg.norm(expected - fits.places[good], axis=1) <= ASTRAY_PX]
     if len(good) < 4:
         return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
-    return ordered(target, points.ravel()[good], sharp[good])
+    sharp = without_edge_shift(plane[good], fits.places[good], _sides(target, tags, steps)[good])
+    return ordered(target, points.ravel()[good], sharp, fits.sigmas_px[good])
 
 
 def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | None:
@@ -103,14 +107,15 @@ def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | 
     tags = np.flatnonzero(read)
     few = spread(len(tags), FEW // 4 if band >= WIDE_PX else len(tags))
     some = (4 * few[:, np.newaxis] + np.arange(4)).ravel()
-    near = _measured(image, target, tags[few], places[read][few], steps[some], rough=True)
+    near = _measured(image, target, tags[few], places[read][few], steps[some], rough=True).places
     # Then it is known well enough where all are, so that where they were put matters no more.
     again, steps = nearer(plane, corners, steps, some, near)
-    sharp = _measured(image, target, tags, again.reshape(-1, 4, 2), steps)
-    good = ~astray(sharp, corners, side * np.linalg.norm(steps, axis=2).min(axis=1))
+    fits = _measured(image, target, tags, again.reshape(-1, 4, 2), steps)
+    good = ~fits.spoilt() & ~astray(fits.places, corners, side * np.linalg.norm(steps, axis=2).min(axis=1))
     if good.sum() < max(4, LEAST_SHARE * 4 * expected.sum()):
         return None
-    return ordered(target, ids[good], sharp[good])
+    sharp = without_edge_shift(plane[good], fits.places[good], _sides(target, tags, steps)[good])
+    return ordered(target, ids[good], sharp, fits.sigmas_px[good])
 
 
 def _markers(image: Image, target: MarkerCorners) -> Seen:
@@ -150,6 +155,17 @@ def _border(target: MarkerCorners) -> float:
     return min(target.border_bits / cells, target.gap_m / _side(target))
 
 
+def _sides(target: MarkerCorners, markers: IndexArray, steps: FloatArray) -> FloatArray:
+    """Return the directions (4 M, 2, 2) in the image of both sides that begin at each corner of markers (M,).
+
+    `steps` (4 M, 2, 2) are the pixels per metre along both axes there.
+    """
+    plane = target.points[:, :2].reshape(-1, 4, 2)[markers]
+    sides = np.stack([np.roll(plane, -1, axis=1) - plane, np.roll(plane, 1, axis=1) - plane], axis=2)
+    directions = sides.reshape(-1, 2, 2) @ steps
+    return directions / np.linalg.norm(directions, axis=2, keepdims=True)
+
+
 def _measured(
     image: Image,
     target: MarkerCorners,
@@ -157,8 +173,8 @@ def _measured(
     tags: FloatArray,
     steps: FloatArray | None,
     rough: bool = False,
-) -> FloatArray:
-    """Return the corners (4 M, 2) of markers (M,) with corners (M, 4, 2) as fitted, NaN where that fails.
+) -> CornerFits:
+    """Return the corners (4 M) of markers (M,) with corners (M, 4, 2) as fitted.
 
     The directions of the edges are those of the outlines, or, if it is known, those that the pixels
     (4 M, 2, 2) per metre along both axes tell.
@@ -167,13 +183,11 @@ def _measured(
     before = np.roll(tags, 1, axis=1) - tags
     lengths = np.minimum(np.linalg.norm(after, axis=2), np.linalg.norm(before, axis=2)).reshape(-1)
     directions = np.stack([after, before], axis=2).reshape(-1, 2, 2)
-    if steps is not None:
-        plane = target.points[:, :2].reshape(-1, 4, 2)[markers]
-        sides = np.stack([np.roll(plane, -1, axis=1) - plane, np.roll(plane, 1, axis=1) - plane], axis=2)
-        directions = sides.reshape(-1, 2, 2) @ steps
     directions = directions / np.linalg.norm(directions, axis=2, keepdims=True)
+    if steps is not None:
+        directions = _sides(target, markers, steps)
     height = lengths * np.abs(np.linalg.det(directions))
-    return fit_corners(
+    return corner_fits(
         image,
         tags.reshape(-1, 2),
         directions,

@@ -140,9 +140,9 @@ def _of_images(images: ImageSet, given: Camera | None, progress: Callable[[int, 
     found, missed, size = _detect(images, progress)
     camera, origin = _camera(images, given, found, size)
     views = [
-        shot.with_points(found[shot.name].point_ids, found[shot.name].pixels)
+        shot.with_points(detection.point_ids, detection.pixels, detection.sigmas_px)
         for shot in images.shots
-        if shot.name in found
+        if (detection := found.get(shot.name)) is not None
     ]
     recording = images.recording(camera, views)
     # What both the set and the recording made of it look at is said once.

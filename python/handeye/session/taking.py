@@ -82,6 +82,7 @@ class Taker:
                 image,
                 seen.timestamp_s,
                 seen.reading.joints_rad,
+                detection.sigmas_px,
             )
             self._store.recording.with_views((*self._store.recording.views, view))
         except HandeyeError as error:

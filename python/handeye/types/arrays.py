@@ -106,6 +106,22 @@ def positive(value: float, what: str) -> float:
     return number
 
 
+def deviations(values: ArrayLike, count: int, what: str) -> FloatArray:
+    """Return standard deviations (N,) of so many points, in pixels.
+
+    Raises
+    ------
+    InputError
+        Another number of them, or one that is not finite and above zero.
+    """
+    sigmas = finite_array(values, (count,), f"{what}: sigmas_px")
+    if not (sigmas > 0).all():
+        raise InputError(
+            f"{what}: sigmas_px: {sigmas.min():g}, expected numbers above zero", code="invalid_field"
+        )
+    return sigmas
+
+
 def _numbers(values: ArrayLike, what: str) -> NDArray[np.generic]:
     try:
         return np.asarray(values)

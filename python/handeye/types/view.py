@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handeye.errors import InputError
-from handeye.types.arrays import FloatArray, IndexArray, finite_array, index_array
+from handeye.types.arrays import FloatArray, IndexArray, deviations, finite_array, index_array
 from handeye.types.plain import Document, read_document, without_none
 from handeye.types.pose import Pose
 
@@ -71,6 +71,7 @@ class _ViewDocument(Document):
     image: str | None = None
     timestamp_s: float | None = None
     joints_rad: list[float] | None = None
+    sigmas_px: list[float] | None = None
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -93,6 +94,9 @@ class View:
         Time of the exposure in seconds on any clock; None if unknown.
     joints_rad
         Joint positions (radians; metres for sliding joints); None if unknown.
+    sigmas_px
+        (N,) standard deviation of one coordinate of each point, in pixels, as the detector states it; None if
+        unknown.
 
     Raises
     ------
@@ -108,6 +112,7 @@ class View:
     image: str | None
     timestamp_s: float | None
     joints_rad: tuple[float, ...] | None
+    sigmas_px: FloatArray | None
 
     def __init__(
         self,
@@ -118,6 +123,7 @@ class View:
         image: str | None = None,
         timestamp_s: float | None = None,
         joints_rad: Sequence[float] | None = None,
+        sigmas_px: ArrayLike | None = None,
     ) -> None:
         check_view_name(name)
         where = f"view {name}"
@@ -150,6 +156,7 @@ class View:
         time = None if timestamp_s is None else float(finite_array(timestamp_s, (), f"{where}: timestamp_s"))
         _set(self, "timestamp_s", time)
         _set(self, "joints_rad", None if joints_rad is None else _joints(joints_rad, where))
+        _set(self, "sigmas_px", None if sigmas_px is None else deviations(sigmas_px, len(ids), where))
 
     def __len__(self) -> int:
         return len(self.point_ids)
@@ -164,6 +171,7 @@ class View:
             image=self.image,
             timestamp_s=self.timestamp_s,
             joints_rad=None if self.joints_rad is None else list(self.joints_rad),
+            sigmas_px=None if self.sigmas_px is None else self.sigmas_px.tolist(),
         )
 
     @classmethod
@@ -184,6 +192,7 @@ class View:
             document.image,
             document.timestamp_s,
             document.joints_rad,
+            document.sigmas_px,
         )
 
     def __eq__(self, other: object) -> bool:

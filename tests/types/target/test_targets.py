@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handeye.errors import InputError
-from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid, Target
-from handeye.types.target.dictionaries import DICTIONARIES, dictionary_of_number
+from handeye.types import AprilGrid, ArucoGrid, ArucoMarker, Charuco, Chessboard, CircleGrid, Target
+from handeye.types.target import Coded
+from handeye.types.target.dictionaries import DICTIONARIES, dictionary_of_number, marker_bits
 from strategies import plain_values, targets
 
 GOOD: list[Target] = [
@@ -18,6 +19,8 @@ GOOD: list[Target] = [
     CircleGrid(4, 11, 0.02, 0.01, marked=3, marked_diameter_m=0.012),
     Charuco(5, 7, 0.04, 0.03, "DICT_5X5_100"),
     AprilGrid(6, 6, 0.088, 0.3),
+    ArucoGrid(4, 3, 0.04, 0.004, "DICT_5X5_250", ids=tuple(range(20, 8, -1))),
+    ArucoMarker(0.1, "DICT_ARUCO_ORIGINAL", 582),
 ]
 
 
@@ -82,11 +85,62 @@ def test_aprilgrid_tags_stand_on_their_head_for_opencv() -> None:
     assert [on_its_head[i] for i in (1, 0, 3, 2)] == [(0, 0), (1, 0), (1, 1), (0, 1)]
 
 
+@pytest.mark.parametrize(("rows", "columns", "first"), [(4, 3, 0), (1, 5, 7), (3, 3, 100)])
+def test_aruco_grid_is_that_of_opencv(rows: int, columns: int, first: int) -> None:
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_250)
+    ids = np.arange(first, first + rows * columns)
+    board = cv2.aruco.GridBoard((columns, rows), 0.04, 0.004, dictionary, ids)
+    ours = ArucoGrid(rows, columns, 0.04, 0.004, "DICT_5X5_250", first_id=first)
+    np.testing.assert_allclose(ours.points.reshape(-1, 4, 3), board.getObjPoints(), atol=1e-7)
+    np.testing.assert_array_equal(ours.marker_ids, np.ravel(board.getIds()))
+    np.testing.assert_array_equal(ours.outlines.reshape(-1, 2), ours.points[:, :2])
+
+
+@pytest.mark.parametrize("legacy", [False, True])
+@pytest.mark.parametrize("shape", [(6, 5), (5, 6), (7, 7), (4, 4)])
+def test_charuco_markers_are_those_of_opencv(shape: tuple[int, int], legacy: bool) -> None:
+    rows, columns = shape
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
+    board = cv2.aruco.CharucoBoard((columns, rows), 0.04, 0.03, dictionary)
+    board.setLegacyPattern(legacy)
+    ours = Charuco(rows, columns, 0.04, 0.03, "DICT_5X5_100", legacy)
+    there = np.asarray(board.getObjPoints())[:, :, :2] - 0.04
+    np.testing.assert_allclose(ours.outlines, there, atol=1e-7)
+    np.testing.assert_array_equal(ours.marker_ids, np.ravel(board.getIds()))
+
+
+def test_ids_that_follow_are_a_first_id_and_defaults_are_not_written() -> None:
+    listed = ArucoGrid(2, 2, 0.04, 0.01, "DICT_4X4_50", ids=(5, 6, 7, 8))
+    assert listed == ArucoGrid(2, 2, 0.04, 0.01, "DICT_4X4_50", first_id=5)
+    assert listed.to_dict() == {
+        "family": "aruco_grid", "rows": 2, "columns": 2, "marker_m": 0.04, "separation_m": 0.01,
+        "dictionary": "DICT_4X4_50", "first_id": 5,
+    }  # fmt: skip
+    shuffled = Charuco(3, 3, 0.04, 0.03, "DICT_4X4_50", ids=(9, 2, 4, 30))
+    assert shuffled.to_dict()["ids"] == [9, 2, 4, 30]
+    assert shuffled.marker_ids.tolist() == [9, 2, 4, 30]
+
+
+def test_files_of_before_are_read() -> None:
+    charuco = {"family": "charuco", "rows": 5, "columns": 7, "square_m": 0.04, "marker_m": 0.03}
+    assert Target.from_dict({**charuco, "dictionary": "DICT_5X5_100", "legacy_pattern": False}) == GOOD[2]
+    tags = {"family": "aprilgrid", "rows": 6, "columns": 6, "tag_m": 0.088, "spacing_ratio": 0.3}
+    assert Target.from_dict(tags) == GOOD[3]
+
+
+@pytest.mark.parametrize("target", [target for target in GOOD if isinstance(target, Coded)], ids=str)
+def test_marker_arrays_are_frozen(target: Coded) -> None:
+    for array in (target.marker_ids, target.outlines):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
 def test_dictionaries_are_those_of_opencv() -> None:
     for number, (name, markers) in enumerate(DICTIONARIES.items()):
         assert getattr(cv2.aruco, name) == number
         assert cv2.aruco.getPredefinedDictionary(number).bytesList.shape[0] == markers
         assert dictionary_of_number(number, "test") == name
+        assert cv2.aruco.getPredefinedDictionary(number).markerSize == marker_bits(name)
     for number in (-1, len(DICTIONARIES)):
         with pytest.raises(InputError):
             dictionary_of_number(number, "test")
@@ -133,6 +187,19 @@ def test_dict_reads_back_and_arrays_are_frozen(target: Target) -> None:
         (GOOD[3], {"dictionary": "DICT_5X5_1000"}),
         (GOOD[3], {"rows": 30, "columns": 30}),
         (GOOD[3], {"border_bits": 3}),
+        (GOOD[3], {"first_id": 560}),
+        (GOOD[3], {"first_id": -1}),
+        (GOOD[2], {"ids": [1, 2, 3]}),
+        (GOOD[2], {"ids": [0, *range(16)]}),
+        (GOOD[2], {"ids": [*range(100, 117)]}),
+        (GOOD[2], {"border_bits": 0}),
+        (GOOD[4], {"first_id": 3}),
+        (GOOD[4], {"separation_m": 0.0}),
+        (GOOD[4], {"separation_m": 3.0}),
+        (GOOD[4], {"rows": 200}),
+        (GOOD[5], {"id": 1024}),
+        (GOOD[5], {"marker_m": -1.0}),
+        (GOOD[5], {"rows": 1}),
     ],
 )
 def test_what_is_no_target_is_refused(target: Target, changes: dict[str, Any]) -> None:

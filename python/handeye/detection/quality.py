@@ -1,0 +1,63 @@
+"""How well each point was measured: a standard deviation from its own picture and from how all of them lie.
+
+What a point's picture tells (blur, contrast, how obliquely edges cross, how well the fit went) says how good
+it is beside the others; how far all of them are off a flat board seen through a lens says how good they are.
+The fewer the points, the more what is usual counts.
+"""
+
+import numpy as np
+
+from handeye import _core
+from handeye.detection.base import Detection
+from handeye.types import Target
+from handeye.types.arrays import FloatArray
+
+# Numbers of a homography; a lens adds polynomials of a degree, from so many points for each of their terms.
+OF_HOMOGRAPHY, DEGREES, POINTS_PER_TERM = 8, (6, 5, 4, 3), 1.9
+# What is usual counts as so many measurements.
+USUAL_COUNT = 2.0
+# No point is better.
+LEAST_PX = 0.001
+# The largest of the squares are left out, as a few points may lie elsewhere (a larger circle does); the mean
+# of the others of a Gaussian is this share of its variance.
+TRIMMED, OF_VARIANCE = 0.1, 0.623
+
+
+def off_plane(plane: FloatArray, pixels: FloatArray) -> tuple[FloatArray, int] | None:
+    """Return by how much (N, 2) points in an image are off those of a flat board seen through a lens.
+
+    Also how many of their coordinates such a view leaves free; None where there is no such view.
+    """
+    lens = _core.PlaneMap.fitted(plane, pixels)
+    if lens is None:
+        return None
+    off = pixels - lens.pixels(plane)
+    for degree in DEGREES:
+        powers = [(i, k) for i in range(degree + 1) for k in range(degree + 1 - i)]
+        if len(plane) >= POINTS_PER_TERM * len(powers):
+            low, high = plane.min(axis=0), plane.max(axis=0)
+            x, y = ((2 * plane - low - high) / np.maximum(high - low, 1e-12)).T
+            columns = np.stack([x**i * y**k for i, k in powers], axis=1)
+            # The affine part of the polynomials is in the homography, too.
+            free = 2 * len(plane) - 2 * len(powers) - (OF_HOMOGRAPHY - 6)
+            return off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0], free
+    return off, 2 * len(plane) - OF_HOMOGRAPHY
+
+
+def scaled(target: Target, detection: Detection) -> Detection:
+    """Return a detection whose standard deviations fit how its points lie on the board.
+
+    Up to then they may be wrong by a factor, the same for all points.
+    """
+    if detection.sigmas_px is None:
+        return detection
+    relative = detection.sigmas_px
+    off = off_plane(target.points[detection.point_ids, :2], detection.pixels)
+    squares, freedom = 0.0, 0
+    if off is not None and off[1] > 0:
+        residuals, freedom = off
+        sorted_squares = np.sort(((residuals / relative[:, np.newaxis]) ** 2).ravel())
+        kept = sorted_squares[: round((1 - TRIMMED) * len(sorted_squares))]
+        squares = float(kept.mean()) / OF_VARIANCE * residuals.size
+    factor = (squares + USUAL_COUNT) / (freedom + USUAL_COUNT)
+    return detection.with_sigmas(np.maximum(np.sqrt(factor) * relative, LEAST_PX))
