@@ -14,7 +14,7 @@ MAX_BYTES = 8 * MIB
 _ID = re.compile(r"\d{1,9}", re.ASCII)
 
 
-# A session writes its recording anew with every view, and most of its views are those of before.
+# A session writes its recording again with every view, and most of its views are those of before.
 @lru_cache(maxsize=128)
 def corners_text(view: View) -> str:
     """Return the text of the file; numbers read back to the last bit."""
