@@ -124,9 +124,9 @@ MUTANTS = (
     Mutant("one process at a time", STORE, "fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", T_BREAKS + "::test_two_processes_do_not_write_one_session"),
     Mutant("interruption stops the arm", LOOP, "            self._cell.stop()\n            raise", "            raise", T_BREAKS + "::test_an_interruption_stops_the_arm_and_leaves_the_session_whole"),
     # Statistics, and what people type.
-    Mutant("tails of Student", "session/request.py", "if np.isfinite(degrees_of_freedom):", "if False:", T_RULES),
+    Mutant("tails of Student", "solving/confidence.py", "if np.isfinite(degrees_of_freedom):", "if False:", T_RULES),
     Mutant("both radii", "session/request.py", "or now.rotation_deg > self.rotation_deg", "", T_RULES),
-    Mutant("probability", "session/request.py", "PROBABILITY = 0.95", "PROBABILITY = 0.9", T_RULES),
+    Mutant("probability", "solving/confidence.py", "PROBABILITY = 0.95", "PROBABILITY = 0.9", T_RULES),
     Mutant("seed of the candidates", CHOOSING, "np.random.default_rng([self._wish.seed, 4, len(situation.entries)])", "np.random.default_rng([0, 4, len(situation.entries)])", T_RULES),
     Mutant("order of the covariance", "types/calibration.py", '("tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")', '("rx_rad", "ry_rad", "rz_rad", "tx_m", "ty_m", "tz_m")', "types/test_calibration.py"),
     Mutant("one view in both halves", "evaluation/protocol.py", "_indices(np.sort(order[middle:]))", "_indices(np.sort(order[middle - 1 :]))", "evaluation/test_protocol.py"),
