@@ -28,7 +28,7 @@ def test_killed_at_any_instant_it_ends_as_if_undisturbed(tmp_path: Path) -> None
     run(configuration, tmp_path / "undisturbed")
     undisturbed = Outcome.of(tmp_path / "undisturbed")
     assert any("failure" in entry for entry in undisturbed.journal)
-    kills = run_killed(configuration, tmp_path / "killed", np.random.default_rng(1), 0.1)
+    kills = run_killed(configuration, tmp_path / "killed", np.random.default_rng(1), 0.04)
     assert kills >= 3
     assert Outcome.of(tmp_path / "killed") == undisturbed
 

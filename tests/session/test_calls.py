@@ -66,6 +66,8 @@ def test_without_a_limit_no_thread_and_no_clock(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("seconds", [5.0, float("inf")])
 def test_messages_are_short_and_can_be_shown(seconds: float) -> None:
+    assert MAX_MESSAGE <= 500
+
     def raising(error: BaseException) -> None:
         raise error
 

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +23,19 @@ def test_the_radius_has_the_tails_of_student(freedom: float) -> None:
 
 
 def test_the_request_is_met_only_if_both_radii_are_and_views_are_enough() -> None:
-    assert Requested(0.5, 0.05).fewest_views >= 6
+    asked = Requested(0.5, 0.05)
+    assert asked.fewest_views >= 6
+    for views, known, millimetres, degrees, met in (
+        (6, True, 0.4, 0.04, True),
+        (5, True, 0.4, 0.04, False),
+        (6, False, 0.4, 0.04, False),
+        (6, True, 0.6, 0.04, False),
+        (6, True, 0.4, 0.06, False),
+    ):
+        within = SimpleNamespace(translation_mm=millimetres, rotation_deg=degrees)
+        estimate = SimpleNamespace(determined=known, within_95=within)
+        stop = asked.verdict(SimpleNamespace(views=views, estimate=estimate))  # type: ignore[arg-type]
+        assert (stop is not None) == met
     for bad in ((0.0, 1.0), (1.0, 0.0), (float("nan"), 1.0), (-1.0, 1.0)):
         with pytest.raises(Exception, match="expected above zero"):
             Requested(*bad)

@@ -14,9 +14,10 @@ from handeye.planning.collisions import Body
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.session.attempt import Cell, Missed, Patience, Seen, attempt
+from handeye.session.choosing import ArmChooser
 from handeye.session.configuration import Prepared, begin, go_on, prepare
 from handeye.session.contract import check_at_rest
-from handeye.session.deciding import EndReason
+from handeye.session.deciding import EndReason, Situation
 from handeye.session.entry import Entry, Failure
 from handeye.session.safety import objection_to_motion
 from handeye.types import Mounting, Pose
@@ -138,6 +139,37 @@ def test_what_is_mounted_takes_part() -> None:
     why = prepared.cell.objection(goal, here, held)  # type: ignore[arg-type]
     assert why is not None
     assert "workspace" in why or "floor" in why
+    # Held out to the side it is above the table, and beyond the box.
+    aside = SimpleNamespace(mounting=Mounting.EYE_IN_HAND, X=Pose.exp([-1.5, 0.0, 0.0, 0, 0, 0]))
+    why = prepared.cell.objection(goal, here, aside)  # type: ignore[arg-type]
+    assert why == "flange or tool would leave the workspace"
+
+
+def test_decisions_begin_where_the_journal_says_that_the_arm_stands(tmp_path: Path) -> None:
+    prepared, _ = watched(5)
+    session, store = begin(prepared, tmp_path / "s")
+    for _ in range(3):
+        session.take(session.next())  # type: ignore[arg-type]
+    store.close()
+    chooser = prepared.chooser()
+    assert isinstance(chooser, ArmChooser)
+    entries = list(store.entries)
+    stood = tuple((HOME + 0.1).tolist())
+    entries.append(replace(entries[-1], number=4, view=None, moved=True, standing_rad=stood))
+    situation = Situation(tuple(entries), (), None, None)  # type: ignore[arg-type]
+    assert chooser._standing(situation) == stood  # pyright: ignore[reportPrivateUsage]
+
+
+def test_a_picture_that_comes_again_is_no_new_one() -> None:
+    prepared, _ = watched(5)
+    goal = goal_at(prepared.arm, HOME + 0.02)
+    tried(prepared.cell, goal)  # which way it came from tells in the play of the joints
+    first = tried(prepared.cell, goal)
+    assert isinstance(first, Seen)
+    assert first.digest is not None
+    again = attempt(prepared.cell, goal, frozenset({first.digest}), {})
+    assert isinstance(again, Missed)
+    assert again.failure is Failure.STALE_IMAGE
 
 
 def test_readings_are_checked_before_the_first_motion(tmp_path: Path) -> None:
