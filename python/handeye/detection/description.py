@@ -74,7 +74,8 @@ def _visible(
 ) -> Iterator[tuple[Target, Reading | None]]:
     """Yield boards that an image shows, those of the family described first, and their markers."""
     # Markers first: what lies between them looks like squares, too.
-    reading = read_markers(image)
+    touched = isinstance(target, Coded) and target.border_bits == 2
+    reading = read_markers(image, touched=touched)
     if reading is not None:
         fewest = 1 if isinstance(target, Coded) else fewest_markers
         yield from ((board, reading) for board in _marked(image, target, reading, fewest))
@@ -99,7 +100,8 @@ def _marked(image: Image, target: Target, reading: Reading, fewest: int) -> Iter
 def _chessboard(image: Image, target: Target) -> Iterator[Chessboard]:
     """Yield the chessboard of whatever size, turned as it is described."""
     pitch = target.spacing_m
-    for rows, columns in chessboard.sizes(image):
+    small = Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
+    for rows, columns in chessboard.sizes(small):
         yield _nearest(target, [Chessboard(rows, columns, pitch), Chessboard(columns, rows, pitch)])
 
 
