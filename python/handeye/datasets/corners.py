@@ -4,6 +4,7 @@ A fourth column, `sigma_px`, holds the standard deviation of each point where th
 """
 
 import re
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ MAX_BYTES = 8 * MIB
 _ID = re.compile(r"\d{1,9}", re.ASCII)
 
 
+# A session writes its recording again with every view, and most of its views are those of before.
+@lru_cache(maxsize=128)
 def corners_text(view: View) -> str:
     """Return the text of the file; numbers read back to the last bit."""
     columns = [view.pixels] if view.sigmas_px is None else [view.pixels, view.sigmas_px[:, np.newaxis]]
