@@ -139,6 +139,7 @@ def views(draw: st.DrawFn, name: str, target: Target) -> View:
         pixels,
         timestamp_s=draw(st.none() | floats(0.0, 2e9)),
         joints_rad=draw(st.none() | st.lists(floats(-6.0, 6.0), min_size=6, max_size=6)),
+        sigmas_px=draw(st.none() | st.lists(floats(1e-3, 3.0), min_size=count, max_size=count)),
     )
 
 

@@ -139,7 +139,7 @@ LOOKS: dict[str, dict[str, float]] = {
 
 
 def quality(views: int) -> None:
-    """Print squared errors over stated variances, per axis, for each family and look, and medians."""
+    """Print squared errors over stated variances, for each family and look, and median deviations."""
     print("| target | " + " | ".join(LOOKS) + " | all |\n|---" + "|---" * (len(LOOKS) + 1) + "|")
     for name, target in TARGETS.items():
         renderer = BoardRenderer(CAMERA, target, Appearance())

@@ -44,6 +44,25 @@ def test_the_file_is_toml_that_a_person_can_read(folder: Path) -> None:
     assert (folder / "corners" / "im_2.csv").read_text().startswith("id,u_px,v_px\n2,")
 
 
+def test_deviations_of_points_are_one_more_column_that_may_be_missing(folder: Path) -> None:
+    file = folder / "corners" / "im_0.csv"
+    plain = file.read_text()
+    assert read_recording(folder).recording.views[0].sigmas_px is None
+    rows = plain.splitlines()
+    file.write_text(
+        "\n".join([f"{rows[0]},sigma_px", *(f"{row},0.0{k + 1}" for k, row in enumerate(rows[1:]))])
+    )
+    view = read_recording(folder).recording.views[0]
+    assert view.sigmas_px is not None
+    assert view.sigmas_px[:2].tolist() == [0.01, 0.02]
+    file.write_text("\n".join([f"{rows[0]},sigma_px", *(f"{row},0" for row in rows[1:])]))
+    with pytest.raises(InputError, match=r"im_0: sigmas_px: 0, expected numbers above zero"):
+        read_recording(folder)
+    file.write_text("\n".join([f"{rows[0]},sigma_px", *rows[1:]]))
+    with pytest.raises(InputError, match="line 2: 3 values, expected id,u_px,v_px,sigma_px"):
+        read_recording(folder)
+
+
 def test_images_are_copied_and_found_again(folder: Path, tmp_path: Path) -> None:
     loaded = read_recording(folder)
     path = loaded.image_path(loaded.recording.views[1])

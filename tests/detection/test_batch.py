@@ -50,3 +50,31 @@ def test_the_cache_knows_content_target_and_size() -> None:
     cache.detect(BLANK.reshape(120, 100), BOARD.target)
     cache.detect(BLANK, TARGETS["april grid"])
     assert len(cache) == 4
+
+
+def test_the_number_of_workers_changes_nothing() -> None:
+    pictures = {
+        f"im_{k}": scene(TARGETS["chessboard"], turn=(0.1 * k, 0.2, 0.1)).picture(k) for k in range(5)
+    }
+    images = [(name, lambda picture=picture: picture) for name, picture in pictures.items()]
+    one, many = (detect_all(images, TARGETS["chessboard"], workers=workers) for workers in (1, 4))
+    assert list(one.found) == list(many.found) == list(pictures)
+    for name in pictures:
+        np.testing.assert_array_equal(one.found[name].pixels, many.found[name].pixels)
+
+
+def test_what_progress_raises_ends_the_work() -> None:
+    asked: list[int] = []
+
+    def load(k: int) -> Image:
+        asked.append(k)
+        return BLANK
+
+    def stop(name: str, _: object) -> None:
+        if name == "im_1":
+            raise KeyboardInterrupt
+
+    images = [(f"im_{k}", lambda k=k: load(k)) for k in range(100)]
+    with pytest.raises(KeyboardInterrupt):
+        detect_all(images, BOARD.target, progress=stop, workers=2)
+    assert len(asked) < 50

@@ -10,6 +10,8 @@ from handeye.detection.base import Image
 from handeye.types.arrays import FloatArray, IndexArray
 
 LEVELS = 12
+# Grey values that an image must span, and outlines looked at: noise has very many.
+LEAST_RANGE, MOST_OUTLINES = 8.0, 6000
 SMALLEST_AREA_PX = 12.0
 FEWEST_EDGE_PX = 8
 # Largest share of the image that one circle may cover.
@@ -69,6 +71,8 @@ def find_spots(image: Image) -> tuple[Spots, Spots]:
     smooth = cv2.GaussianBlur(image, (3, 3), 0)
     low, high = (float(v) for v in np.percentile(smooth[::4, ::4], [1, 99]))
     rows: list[tuple[float, ...]] = []
+    if high - low < LEAST_RANGE:
+        return _merged(np.zeros((0, 6))), _merged(np.zeros((0, 6)))
     for level in np.linspace(low, high, LEVELS + 2)[1:-1]:
         binary = cv2.threshold(smooth, level, 255, cv2.THRESH_BINARY)[1]
         outlines, hierarchy = cv2.findContours(binary, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
@@ -103,6 +107,10 @@ def _elliptical(moments: FloatArray, pixels: int) -> tuple[FloatArray, NDArray[n
 
 def _merged(rows: FloatArray) -> Spots:
     """Take outlines of one spot together; the one of median area stands for it."""
+    if len(rows) > MOST_OUTLINES:
+        # What noise draws is small.
+        areas_squared = rows[:, 2] * rows[:, 4] - rows[:, 3] ** 2
+        rows = rows[np.sort(np.argsort(-areas_squared, kind="stable")[:MOST_OUTLINES])]
     rows = rows[np.argsort(-rows[:, 5], kind="stable")]
     radii = np.sqrt(np.sqrt(np.maximum(rows[:, 2] * rows[:, 4] - rows[:, 3] ** 2, 1e-12)))
     free = np.ones(len(rows), dtype=bool)

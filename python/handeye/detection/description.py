@@ -52,7 +52,11 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
         return missing
     # Where there are markers of the board, it is another with such markers, or none.
     only_markers = isinstance(target, Coded) and missing.reason is not Reason.NO_PATTERN
-    shown, markers = next(_visible(image, target, only_markers=only_markers), (None, None))
+    # Where no markers are described, whatever there is need only be told, not measured.
+    small = (
+        image if isinstance(target, Coded) else Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
+    )
+    shown, markers = next(_visible(small, target, only_markers=only_markers), (None, None))
     if shown is None:
         return missing
     if shown != target:

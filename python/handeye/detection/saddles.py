@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handeye.detection.base import Image
-from handeye.types.arrays import FloatArray
+from handeye.types.arrays import FloatArray, IndexArray
 
 # Rings around a candidate, in pixels: the smaller one for small squares, the larger one for blurred pictures.
 RINGS_PX = (3.0, 4.5)
@@ -26,7 +26,7 @@ LEAST_ANGLE_RAD = 0.3
 # Least strength of a candidate: that of little contrast and much blur.
 LEAST_STRENGTH = 0.02
 # Strongest candidates looked at, crossings kept, and side of the square in which there is only one.
-MOST, MOST_KEPT, ALONE_PX = 4000, 1200, 5
+MOST, MOST_KEPT, ALONE_PX = 3000, 1200, 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +111,7 @@ def _maxima(strengths: NDArray[np.float32]) -> FloatArray:
     values = strengths[rows, columns]
     # Equal strengths are taken in the order of the pixels, so that the answer is always the same.
     order = np.argsort(-values, kind="stable")[:MOST]
+    order = order[~_repeated(rows[order], columns[order], values[order])]
     rows, columns, values = rows[order], columns[order], values[order]
     places = np.column_stack([columns, rows]).astype(np.float64)
     for axis, (v, u) in enumerate(((0, 1), (1, 0))):
@@ -120,6 +121,18 @@ def _maxima(strengths: NDArray[np.float32]) -> FloatArray:
             -0.5, 0.5
         )
     return places
+
+
+def _repeated(rows: IndexArray, columns: IndexArray, values: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Tell which maxima (N,), sorted by value, are of the same plateau as one before."""
+    begins = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0) + 1, [len(values)]])
+    repeated = np.zeros(len(values), dtype=bool)
+    for group in np.flatnonzero(np.diff(begins) > 1):
+        part = slice(begins[group], begins[group + 1])
+        u, v = columns[part], rows[part]
+        near = np.maximum(np.abs(u[:, np.newaxis] - u), np.abs(v[:, np.newaxis] - v)) < ALONE_PX
+        repeated[part] = np.tril(near, -1).any(axis=1)
+    return repeated
 
 
 def _on_ring(picture: Image, places: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:

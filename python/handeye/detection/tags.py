@@ -156,7 +156,7 @@ def _border(target: MarkerCorners) -> float:
 
 
 def _sides(target: MarkerCorners, markers: IndexArray, steps: FloatArray) -> FloatArray:
-    """Return the directions (4 M, 2, 2) in the image of the two sides at each corner of markers (M,).
+    """Return the directions (4 M, 2, 2) in the image of both sides that begin at each corner of markers (M,).
 
     `steps` (4 M, 2, 2) are the pixels per metre along both axes there.
     """

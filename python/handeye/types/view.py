@@ -95,8 +95,8 @@ class View:
     joints_rad
         Joint positions (radians; metres for sliding joints); None if unknown.
     sigmas_px
-        (N,) standard deviations of each point, of one coordinate, in pixels, as the detector states them;
-        None if unknown.
+        (N,) standard deviation of one coordinate of each point, in pixels, as the detector states it; None if
+        unknown.
 
     Raises
     ------
