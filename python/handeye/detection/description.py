@@ -18,8 +18,9 @@ from handeye.types.arrays import IndexArray
 from handeye.types.target import Coded, MarkerCorners
 
 _Board = TypeVar("_Board", bound=Target)
-# A board without markers is looked for in a picture no larger than this.
-SEARCH_SIDE_PX = 1000
+# A board without markers is looked for in a picture no larger than this; circles, of which noise makes many,
+# in a smaller one.
+SEARCH_SIDE_PX, CIRCLES_SIDE_PX = 1000, 600
 # Fewer markers are chance where none are expected.
 FEWEST_MARKERS = 4
 # Share of the circles of a grid that must be there, the fewest that are a grid, and the most.
@@ -78,7 +79,8 @@ def _visible(
 ) -> Iterator[tuple[Target, Reading | None]]:
     """Yield boards that an image shows, those of the family described first, and their markers."""
     # Markers first: what lies between them looks like squares, too.
-    reading = read_markers(image)
+    touched = isinstance(target, Coded) and target.border_bits == 2
+    reading = read_markers(image, touched=touched)
     if reading is not None:
         fewest = 1 if isinstance(target, Coded) else fewest_markers
         yield from ((board, reading) for board in _marked(image, target, reading, fewest))
@@ -110,7 +112,7 @@ def _chessboard(image: Image, target: Target) -> Iterator[Chessboard]:
 
 def _circle_grid(image: Image, target: Target) -> Iterator[Target]:
     """Yield the grid of circles of whatever size, turned as it is described."""
-    small = Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
+    small = Part.whole(image, CIRCLES_SIDE_PX / max(image.shape)).picture
     for spots in find_spots(small):
         lattice = grow(spots, MOST_CIRCLES)
         if len(lattice) >= FEWEST_CIRCLES:

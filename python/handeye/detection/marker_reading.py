@@ -64,8 +64,16 @@ class Reading:
     repeated: IndexArray
 
 
-def read_markers(image: Image) -> Reading | None:
-    """Return the markers of the dictionary that most of them are of; None where there are none."""
+def read_markers(image: Image, *, touched: bool = False) -> Reading | None:
+    """Return the markers of the dictionary that most of them are of; None where there are none.
+
+    Parameters
+    ----------
+    image
+        The picture (H, W).
+    touched
+        Whether squares that touch the markers are to be reckoned with where none is read otherwise.
+    """
     readings = dict[tuple[str, int, bool], Reading]()
     best: Reading | None = None
     for change, size in THINNED:
@@ -75,7 +83,7 @@ def read_markers(image: Image) -> Reading | None:
             kind = reading.dictionary, reading.border_bits, reading.inverted
             readings[kind] = _together(readings[kind], reading) if kind in readings else reading
         best = max(map(_outermost, readings.values(), repeat(readings)), key=_weight, default=None)
-        if best is not None and best.border_bits == 1 and len(best.ids) >= 2 * FEWEST_OF_FOUR:
+        if not (touched if best is None else best.border_bits == 2):
             break
     return None if best is None else replace(best, corners=_sharpened(image, best.corners))
 
