@@ -16,10 +16,10 @@ from handeye.cli.output import check_new_folder
 from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.notations import SHOWN
 from handeye.planning.collisions import Body
 from handeye.planning.sieve import ViewLimits
 from handeye.robots.manual import describe
-from handeye.robots.notations import Notation
 from handeye.robots.protocol import Goal
 from handeye.session.attempt import Patience
 from handeye.session.configuration import (
@@ -301,7 +301,7 @@ def _confirm(wanted: bool | None, configuration: Configuration, person: Person) 
         return None
 
     def confirm(goal: Goal) -> bool:
-        person.tell(describe(goal, [Notation.UR]))
+        person.tell(describe(goal, SHOWN[:1]))
         try:
             return person.ask("move there? [y/N] ").strip().lower() in {"y", "yes"}
         except EOFError:
@@ -364,7 +364,7 @@ def _plan(prepared: Prepared) -> Answer:
             f"probability, at most {wish.most_views} views.\n"
         )
         for goal in goals:
-            console.print(describe(goal, list(Notation)), markup=False)
+            console.print(describe(goal), markup=False)
 
     return Answer(data, show)
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from handeye.errors import DeviceError, HandeyeError
-from handeye.robots.notations import MAX_TEXT, Notation, example, pose_text, read_pose_text
+from handeye.notations import NOTATIONS, SHOWN, Notation, Unit, example, pose_text, read_pose_text
+from handeye.notations.text import MAX_TEXT
 from handeye.robots.protocol import Goal, Reading
 
 SKIP = frozenset({"skip", "no", "s"})
@@ -23,6 +24,8 @@ class ManualRobot:
         Shows a text.
     notation
         How the pose is read back; goals are shown in it first.
+    unit
+        Unit of its lengths; None for that of the notation.
     notations
         All notations in which goals are shown.
 
@@ -34,13 +37,14 @@ class ManualRobot:
         self,
         ask: Callable[[str], str],
         tell: Callable[[str], None],
-        notation: Notation = Notation.UR,
-        notations: Sequence[Notation] = tuple(Notation),
+        notation: Notation = NOTATIONS["ur"],
+        unit: Unit | None = None,
+        notations: Sequence[Notation] = SHOWN,
     ) -> None:
         self._ask = ask
         self._tell = tell
-        self._notation = notation
-        self._notations = [notation, *(other for other in notations if other is not notation)]
+        self._notation, self._unit = notation, unit
+        self._notations = [other for other in notations if other is not notation]
         self._reading: Reading | None = None
 
     def move_to(self, goal: Goal) -> None:
@@ -51,8 +55,8 @@ class ManualRobot:
         DeviceError
             The person will not go there.
         """
-        self._tell(describe(goal, self._notations))
-        self._reading = self._read(f"{goal.label}: pose reached ({self._notation}, or skip): ")
+        self._tell(describe(goal, self._notations, first=(self._notation, self._unit)))
+        self._reading = self._read(f"{goal.label}: pose reached ({self._notation.name}, or skip): ")
 
     def read_pose(self) -> Reading:
         """Return the pose that was typed last; asks for it before the first motion.
@@ -63,7 +67,7 @@ class ManualRobot:
             The person will not say.
         """
         if self._reading is None:
-            self._reading = self._read(f"pose of the flange now ({self._notation}, or skip): ")
+            self._reading = self._read(f"pose of the flange now ({self._notation.name}, or skip): ")
         return self._reading
 
     def stop(self) -> None:
@@ -79,19 +83,24 @@ class ManualRobot:
             if text.lower() in SKIP:
                 raise DeviceError("skipped by hand", code="motion_refused")
             try:
-                return Reading(read_pose_text(_or_file(text), self._notation))
+                return Reading(read_pose_text(_or_file(text), self._notation, self._unit))
             except HandeyeError as error:
-                self._tell(f"{error.message}; for example {example(self._notation)}")
+                self._tell(f"{error.message}; for example {example(self._notation, self._unit)}")
 
 
-def describe(goal: Goal, notations: Sequence[Notation]) -> str:
-    """Return where to go, in joint values and in the notations of several makers."""
+def describe(
+    goal: Goal, notations: Sequence[Notation] = SHOWN, *, first: tuple[Notation, Unit | None] | None = None
+) -> str:
+    """Return where to go, in joint values and in the notations of several makers, one of them first."""
     lines = [f"Go to {goal.label}:"]
     if goal.joints_rad is not None:
         lines.append(
             "  joints " + "  ".join(f"{value:.3f}" for value in np.rad2deg(goal.joints_rad)) + "  deg"
         )
-    lines += [f"  {notation:<6} {pose_text(goal.T_base_flange, notation)}" for notation in notations]
+    shown = [*([] if first is None else [first]), *((notation, None) for notation in notations)]
+    lines += [
+        f"  {notation.name:<6} {pose_text(goal.T_base_flange, notation, unit)}" for notation, unit in shown
+    ]
     return "\n".join(lines)
 
 

@@ -18,8 +18,8 @@ from handeye.cameras.replay import ReplayCamera
 from handeye.datasets.images import read_image
 from handeye.errors import DeviceError, InputError
 from handeye.importing import Opened, open_folder
+from handeye.notations import notation_of, unit_of
 from handeye.robots.manual import ManualRobot
-from handeye.robots.notations import Notation
 from handeye.robots.protocol import Robot
 from handeye.robots.replay import ReplayRobot
 from handeye.types import View
@@ -39,7 +39,7 @@ class Person:
 
 
 def open_robot(spec: str, person: Person) -> Robot:
-    """Return the robot of a specification: `manual`, `manual:kuka`, `replay:FOLDER` or `NAME:ADDRESS`.
+    """Return the robot of a specification: `manual:kuka`, `manual:ur/mm`, `replay:FOLDER` or `NAME:ADDRESS`.
 
     Raises
     ------
@@ -50,13 +50,9 @@ def open_robot(spec: str, person: Person) -> Robot:
     """
     name, _, address = spec.partition(":")
     if name == "manual":
-        try:
-            notation = Notation(address or Notation.UR)
-        except ValueError:
-            raise InputError(
-                f"notation {address!r}, expected one of {', '.join(Notation)}", code="unknown_notation"
-            ) from None
-        return ManualRobot(person.ask, person.tell, notation)
+        notation, _, unit = address.partition("/")
+        written = notation_of(notation or "ur")
+        return ManualRobot(person.ask, person.tell, written, unit_of(unit) if unit else None)
     if name == REPLAY:
         return ReplayRobot(open_folder(address).recording.views)
     return _announced(ROBOT_GROUP, name, address, ROBOTS, Robot)
