@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from datasets.layouts import some_pose
-from handeye.datasets import PoseTable, read_poses_csv
+from handeye.datasets import PoseTable, read_poses
 from handeye.errors import InputError
 
 HEADER = "x,y,z,qx,qy,qz,qw\n"
@@ -15,7 +15,7 @@ HEADER = "x,y,z,qx,qy,qz,qw\n"
 def read(tmp_path: Path, text: str) -> PoseTable:
     path = tmp_path / "poses.csv"
     path.write_text(text)
-    return read_poses_csv(path)
+    return read_poses(path)
 
 
 def row(k: int) -> str:
@@ -79,5 +79,5 @@ def test_faults_name_the_line(tmp_path: Path, text: str, code: str, place: str) 
 
 def test_no_such_file(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
-        read_poses_csv(tmp_path / "no.csv")
+        read_poses(tmp_path / "no.csv")
     assert caught.value.code == "missing_file"

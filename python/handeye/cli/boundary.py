@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shlex
 import sys
 import traceback
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from cyclopts import CycloptsError
 from handeye.cli.answer import Answer, json_text
 from handeye.cli.app import COMMANDS, make_app
 from handeye.cli.failures import UnexpectedError, UsageError, WarnedError
-from handeye.errors import ExitCode, HandeyeError
+from handeye.errors import ExitCode, HandeyeError, InputError, UnstatedError
 
 REPORT = (
     "This is a mistake in handeye. Please report it with the command, what --debug prints, and the version."
@@ -33,6 +34,8 @@ def run(arguments: Sequence[str]) -> int:
         return ExitCode.SUCCESS
     except CycloptsError as error:
         return _fail(_usage(error, options), as_json=as_json, debug=debug)
+    except UnstatedError as error:
+        return _fail(_with_command(error, options), as_json=as_json, debug=debug)
     except HandeyeError as error:
         return _fail(error, as_json=as_json, debug=debug)
     except WarnedError as warned:
@@ -66,6 +69,21 @@ def _usage(error: CycloptsError, arguments: Sequence[str]) -> HandeyeError:
     return UsageError(message, hint=f"{chain} --help says what can be asked").with_traceback(
         error.__traceback__
     )
+
+
+def _with_command(error: UnstatedError, arguments: Sequence[str]) -> HandeyeError:
+    """Return the error with the command line to run, where the pictures tell what to state."""
+    if not error.options:
+        return error
+    told = {option for option in error.options if option.startswith("--")}
+    kept, skip = list[str](), False
+    for argument in arguments:
+        if not skip and argument.partition("=")[0] not in told:
+            kept.append(argument)
+        skip = argument in told
+    command = shlex.join(["handeye", *kept, *error.options])
+    hint = f"run: {command}" + (f"\n      {error.hint}" if error.hint else "")
+    return InputError(error.message, code=error.code, hint=hint).with_traceback(error.__traceback__)
 
 
 def _unexpected(error: Exception) -> HandeyeError:

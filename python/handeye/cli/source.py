@@ -10,9 +10,10 @@ from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
-from handeye.datasets import DataWarning, read_camera, read_target
+from handeye.datasets import DataWarning, Statement, read_camera, read_target
 from handeye.errors import HandeyeError
 from handeye.importing import Opened, SourceOptions, open_folder
+from handeye.notations import Direction, Unit, notation_of
 from handeye.types import Chessboard, Mounting, Target
 
 
@@ -30,9 +31,17 @@ class Source:
     target: Path | None = None
     """Target of any family, in TOML or JSON with the fields of [target] in a recording."""
     camera: Path | None = None
-    """Camera, in TOML or JSON with the fields of [camera] in a recording, or ROS's camera_info .yaml."""
+    """Camera: TOML or JSON of ours, ROS's camera_info, OpenCV's FileStorage, Kalibr, RealSense, Open3D."""
     mounting: Mounting | None = None
     """Where the camera sits."""
+    poses: str | None = None
+    """File or folder with the robot's poses: CSV, text, JSON or YAML."""
+    notation: str | None = None
+    """How they are written: ur, kuka, fanuc, abb, ..., or euler_zyx_moving_deg and its like."""
+    unit: Unit | None = None
+    """Unit of their lengths."""
+    poses_are: Direction | None = None
+    """Whose pose in which frame they are; the flange in the base if not given."""
     layout: Annotated[str | None, Parameter(help="Layout of the files, where several fit.")] = None
 
     def options(self) -> SourceOptions:
@@ -52,7 +61,20 @@ class Source:
             pattern=pattern,
             mounting=self.mounting,
             camera=None if self.camera is None else read_camera(self.camera),
+            poses=self.poses,
+            stated=self.stated(),
         )
+
+    def stated(self) -> Statement:
+        """Return what is said about the robot's poses.
+
+        Raises
+        ------
+        InputError
+            A notation that is not known.
+        """
+        notation = None if self.notation is None else notation_of(self.notation)
+        return Statement(notation, self.unit, self.poses_are)
 
     def _target(self) -> tuple[Target | None, tuple[int, int] | None]:
         if self.target is not None:

@@ -3,8 +3,8 @@
 Nothing is executed and no tag of YAML means anything here. Numbers of YAML and XML stay text until somebody
 asks for one, see `handeye.datasets.yaml_reading`.
 
-`cv::FileStorage` writes ``%YAML:1.0`` where YAML wants ``%YAML 1.0``, and matrices as ``!!opencv-matrix`` with
-rows, cols, dt, data (OpenCV, `persistence_yml.cpp`, `persistence_xml.cpp`).
+`cv::FileStorage` writes ``%YAML:1.0`` where YAML wants ``%YAML 1.0``, and matrices as ``!!opencv-matrix``
+with rows, cols, dt, data (OpenCV, `persistence_yml.cpp`, `persistence_xml.cpp`).
 """
 
 import json
@@ -58,13 +58,9 @@ def yaml_of(text: str, where: str) -> object:
 def _json(path: Path) -> object:
     text = read_text(path, MAX_JSON_BYTES)
     try:
-        return cast("object", json.loads(text, parse_constant=_refused))
+        return cast("object", json.loads(text))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON: {str(error)[:200]}", code="not_json") from error
-
-
-def _refused(name: str) -> object:
-    raise ValueError(f"{name} is no number")
 
 
 def _xml(path: Path) -> object:

@@ -12,7 +12,6 @@ four numbers. Unknown fields are errors: a misspelt one must not be silently wit
 """
 
 import os
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from handeye.datasets.corners import corners_text, read_corners
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning, recording_warnings
 from handeye.datasets.reading import MIB, existing_folder, inside, is_file, located, read_text
+from handeye.datasets.toml_reading import parse_toml
 from handeye.datasets.toml_text import toml_text
 from handeye.datasets.writing import copy_file, is_occupied, new_folder, replace_file, write_file
 from handeye.errors import HandeyeError, InputError, OutputError
@@ -32,8 +32,6 @@ FORMAT = "handeye-recording"
 VERSION = 1
 FILE_NAME = "recording.toml"
 MAX_BYTES = 4 * MIB
-# A key of very many parts, a.a.a..., takes the reader of TOML hours; no line of ours has nearly as many dots.
-MAX_DOTS_IN_LINE = 300
 
 Rows = list[list[float]]
 
@@ -156,16 +154,7 @@ def write_recording(
 
 def _read_document(file: Path) -> _RecordingDocument:
     text = read_text(file, MAX_BYTES)
-    if any(line.count(".") > MAX_DOTS_IN_LINE for line in text.split("\n")):
-        raise InputError(f"{file}: a line with more than {MAX_DOTS_IN_LINE} dots", code="not_toml")
-    try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"{file}: not TOML: {error}",
-            code="not_toml",
-            hint="repair the line, or write the recording again",
-        ) from error
+    data = parse_toml(text, file)
     if data.get("format") != FORMAT:
         raise InputError(
             f"{file}: format {str(data.get('format'))[:60]!r}, expected {FORMAT!r}", code="unknown_format"
