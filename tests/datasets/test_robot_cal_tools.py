@@ -79,7 +79,7 @@ def test_the_other_name_of_the_list(tmp_path: Path) -> None:
     (folder / "cal_data.yaml").rename(folder / "data.yaml")
     assert len(images_of(folder).shots) == 2
     (folder / "target.yaml").unlink()
-    with pytest.raises(InputError, match="nothing that can be read"):
+    with pytest.raises(InputError, match="no file with the robot's poses"):
         load(folder)
 
 

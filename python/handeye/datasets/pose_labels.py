@@ -31,11 +31,13 @@ INDICES = frozenset(
 TIMES = frozenset(
     ("t", "time", "timestamp", "stamp", "time_s", "timestamp_s", "timestamp_ns", "sec", "seconds")
 )
+# The third angle in x, y, z, r, p, y.
+_SECOND_Y = "y2"
 _PREFIXES = re.compile(
     r"^(position|pos|translation|trans|tcp|p|t|pose|orientation|quaternion|quat|q|rotation|rot|r)"
     r"[ _.]?(?=[xyzw]$)"
 )
-_UNIT = re.compile(r"[ _]*[\[(]?\b(mm|cm|m|deg|degrees|rad|radians|°)[\])]?$|[\[(](.*?)[\])]$")
+_UNIT = re.compile(r"[ _]*(?:[\[(]|(?<=[ _]))(mm|cm|m|deg|degrees|rad|radians|°)[\])]?$|[\[(](.*?)[\])]$")
 _ROTATION_PREFIXES = ("orientation", "quaternion", "quat", "q", "rotation", "rot")
 
 
@@ -77,12 +79,16 @@ def columns_of(header: Sequence[str]) -> Columns:
     """
     plain = [_plain(field) for field in header]
     labels = [label for label, _ in plain]
+    if labels[-3:] == ["r", "p", "y"]:
+        labels[-1] = _SECOND_Y
     lengths = {unit for label, unit in plain if label in POSITION and unit in {"mm", "cm", "m"}}
     angles = {unit for label, unit in plain if label not in POSITION and unit in {"deg", "rad"}}
     name = next((i for i, label in enumerate(labels) if label in NAMES), None)
     if name is None:
         name = next((i for i, label in enumerate(labels) if label in INDICES), None)
-    times = [i for i, label in enumerate(labels) if label in TIMES and i != name]
+    # The third angle of Kawasaki is called T.
+    is_time = TIMES - {"t"} if {"o", "a", "t"} <= set(labels) else TIMES
+    times = [i for i, label in enumerate(labels) if label in is_time and i != name]
     left = [i for i in range(len(labels)) if i != name and i not in times and labels[i] not in NAMES]
     chosen = _pose_columns(labels, left)
     twice = [labels[i] for i in chosen if labels.count(labels[i]) > 1]
@@ -124,9 +130,8 @@ def _pose_columns(labels: Sequence[str], left: Sequence[int]) -> list[int]:
 
 
 def _maker_rotations() -> list[tuple[str, ...]]:
-    return list(
-        dict.fromkeys(tuple(label.lower() for label in maker.labels[3:]) for maker in MAKERS if maker.labels)
-    )
+    turns = (tuple(label.lower() for label in maker.labels[3:]) for maker in MAKERS if maker.labels)
+    return [*dict.fromkeys(turns), ("r", "p", _SECOND_Y)]
 
 
 def _plain(field: str) -> tuple[str, str]:

@@ -196,9 +196,9 @@ class PoseRows:
             self._columns(notation)
         except InputError:
             return False
-        rotation = notation.form.rotation if isinstance(notation.form, Vector) else None
         if self.labels[-4:] == QUATERNION:
-            return isinstance(rotation, Quaternion)
+            return notation.name == "quaternion_xyzw"
+        rotation = notation.form.rotation if isinstance(notation.form, Vector) else None
         if self.labels[-3:] == ROTATION_VECTOR:
             return isinstance(rotation, RotationVector)
         is_angle = isinstance(rotation, (Euler, RotationVector))

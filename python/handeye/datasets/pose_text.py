@@ -24,13 +24,14 @@ MAX_NAME_LENGTH = 200
 MAX_LINE = 20_000
 _COMMENT = ("#", "//", "%")
 _STATED = re.compile(r"^[#/%\s]*(notation|unit|units|poses[ _-]are)\s*[:=]\s*([\w/ -]+?)\s*$", re.IGNORECASE)
-_PICTURE = re.compile(
-    rf"[\w./\\-]*[\w-](?:{'|'.join(map(re.escape, sorted(IMAGE_SUFFIXES)))})\b", re.IGNORECASE | re.ASCII
-)
+_ENDS = "|".join(map(re.escape, sorted(IMAGE_SUFFIXES)))
+_PICTURE = re.compile(rf"(?<![\w./\\-])[\w./\\-]*[\w-](?:{_ENDS})\b", re.IGNORECASE | re.ASCII)
 _FREE_NUMBER = re.compile(rf"(?<![A-Za-z0-9_.]){NUMBER}(?![A-Za-z_])", re.ASCII)
 _LABELLED = re.compile(
     rf"(?<![A-Za-z0-9_])([XYZABCWPROTUV]|R[XYZ])\s*[:=]?\s*({NUMBER})", re.ASCII | re.IGNORECASE
 )
+# Position and quaternion of a robtarget of ABB; configuration and outer axes follow.
+_ROBTARGET = re.compile(r"\[\s*\[[^\[\]]*\][\s,]*\[[^\[\]]*\](?=[\s,]*\[)")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 
 _Row = tuple[str, list[float], str]
@@ -265,7 +266,8 @@ def _one_a_line(path: Path, rows: Sequence[tuple[str, list[str]]]) -> list[_Row]
         words = [f for f in fields if f and not any(c.isdigit() for c in f)]
         if not picture and re.fullmatch(r"[A-Za-z_][\w.-]*", fields[0]):
             name = fields[0]
-        numbers = _numbers(line.removeprefix(name) if not picture else line)
+        target = _ROBTARGET.search(line)
+        numbers = _numbers(target.group() if target else line if picture else line.removeprefix(name))
         for word in words:
             if word.lower().strip("+-[]()") in {"nan", "inf", "infinity"}:
                 number(word.strip("[]()"), f"{path}: {place}")

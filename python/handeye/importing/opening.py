@@ -254,7 +254,7 @@ def _told_by_pictures(unread: UnreadPoses, recording: Recording, mounting: Mount
     mountings = tuple(Mounting) if mounting is None else (mounting,)
     rows = unread.rows.select(kept)
     agreements = compare(rows, unread.readings, measurements.camera_poses, mountings)
-    return unstated(unread, agreements, mounting_stated=mounting is not None)
+    return unstated(unread, agreements, mounting_stated=mounting is not None, views=len(kept))
 
 
 def _no_points(pairs: PosePairs) -> InputError:

@@ -23,24 +23,26 @@ def unstated(unread: UnreadPoses, agreements: Sequence[Agreement], *, mounting_s
         How well each reading agrees, the best first.
     mounting_stated
         Whether the caller has said where the camera sits.
+    views
+        Number of pictures that could tell.
     """
     file = unread.file
     say = "say how they are written with --notation and --unit; docs/conventions.md has the table"
-    if not agreements:
+    if views < MIN_VIEWS:
         return UnstatedError(
             f"{file} does not say how its poses are written, and fewer than {MIN_VIEWS} pictures show "
             "the target so that they could tell",
             hint=say,
         )
-    best = agreements[0]
-    rivals = distinct(best, agreements)
-    if not best.fits:
+    if not agreements or not agreements[0].fits:
+        nearest = f"; the best, {agreements[0].reading}, is off by {agreements[0]}" if agreements else ""
         return UnstatedError(
-            f"{file}: no way to read the poses agrees with the pictures; the best, {best.reading}, is off by "
-            f"{best}",
+            f"{file}: no way to read the poses agrees with the pictures{nearest}",
             hint="do the rows belong to these pictures, in this order? Is the target as large as stated? "
             f"If so, {say}",
         )
+    best = agreements[0]
+    rivals = distinct(best, agreements)
     close = [rival for rival in rivals if rival.fits and rival.misfit < CLEARLY * best.misfit]
     if close:
         named = [best, *close][:_MOST_NAMED]

@@ -173,7 +173,8 @@ MAKERS: tuple[Notation, ...] = (
     Notation("staubli", _euler("xyz", moving=True), Unit.MM, _RXYZ, "{{{}}}"),
     Notation("yaskawa", _FIXED_XYZ, Unit.MM, _RXYZ, is_named=True),
     Notation("mitsubishi", _FIXED_XYZ, Unit.MM, (*_XYZ, "A", "B", "C"), "({})"),
-    Notation("nachi", _MOVING_ZYX, Unit.MM, (*_XYZ, "r", "p", "y"), "({})"),
+    # Its letters r, p, y would meet Y of the position.
+    Notation("nachi", _MOVING_ZYX, Unit.MM, layout="({})"),
     Notation("denso", _FIXED_XYZ, Unit.MM, _RXYZ, "P({})"),
     Notation("xarm", _FIXED_XYZ, Unit.MM, (*_XYZ, "roll", "pitch", "yaw"), "[{}]"),
     Notation("kawasaki", _MOVING_ZYZ, Unit.MM, (*_XYZ, "O", "A", "T"), is_named=True),
