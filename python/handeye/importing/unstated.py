@@ -12,7 +12,9 @@ _MOST_NAMED = 4
 _WHERE = {Mounting.EYE_IN_HAND: "the camera in the hand", Mounting.EYE_TO_HAND: "the camera beside the robot"}
 
 
-def unstated(unread: UnreadPoses, agreements: Sequence[Agreement], *, mounting_stated: bool) -> UnstatedError:
+def unstated(
+    unread: UnreadPoses, agreements: Sequence[Agreement], *, views: int, mounting_stated: bool
+) -> UnstatedError:
     """Return the error that names the reading that agrees, how well the next one does, and the options.
 
     Parameters
