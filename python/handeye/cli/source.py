@@ -10,9 +10,9 @@ from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
-from handeye.datasets import DataWarning, Statement, read_camera, read_target
+from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, read_target
 from handeye.errors import HandeyeError
-from handeye.importing import Opened, SourceOptions, open_folder
+from handeye.importing import Opened, SourceOptions, open_any, open_folder
 from handeye.notations import Direction, Unit, notation_of
 from handeye.types import Chessboard, Mounting, Target
 
@@ -88,6 +88,18 @@ class Source:
         if self.pitch_mm is None:
             return None, (self.rows, self.columns)
         return Chessboard(self.rows, self.columns, self.pitch_mm / 1000), None
+
+    def open_any(self, folder: Path) -> Opened | PosePairs:
+        """Read a folder or a file, also one that holds poses of the target instead of pictures.
+
+        Raises
+        ------
+        UsageError, InputError, DetectionError
+            As `options` and `handeye.importing.open_any`.
+        """
+        options = self.options()
+        with progress("Looking for the target in the images") as advance:
+            return open_any(folder, options, progress=advance)
 
     def open(self, folder: Path) -> Opened:
         """Read a folder, with progress where the target has to be found in images first.

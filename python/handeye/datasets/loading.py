@@ -3,7 +3,16 @@
 import os
 from pathlib import Path
 
-from handeye.datasets import pose_list, recording_format, robot_cal_tools, rwhe_calib
+from handeye.datasets import (
+    easy_handeye2,
+    industrial_calibration,
+    moveit_samples,
+    pose_list,
+    recording_format,
+    robot_cal_tools,
+    rwhe_calib,
+    visp,
+)
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Imported, Importer
 from handeye.datasets.pose_rows import NOTHING_STATED, Statement
@@ -14,7 +23,15 @@ from handeye.types import Mounting, Target
 
 IMPORTERS: dict[str, Importer] = {
     importer.name: importer
-    for importer in (rwhe_calib.IMPORTER, robot_cal_tools.IMPORTER, pose_list.IMPORTER)
+    for importer in (
+        rwhe_calib.IMPORTER,
+        robot_cal_tools.IMPORTER,
+        industrial_calibration.IMPORTER,
+        easy_handeye2.IMPORTER,
+        moveit_samples.IMPORTER,
+        visp.IMPORTER,
+        pose_list.IMPORTER,
+    )
 }
 # Loading these runs or rebuilds whatever their author put in.
 _NEVER_LOADED = frozenset({".mat", ".pkl", ".pickle", ".npy", ".npz"})

@@ -6,6 +6,7 @@ key that is there twice is refused: the reader could not know which of the two w
 """
 
 import itertools
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import cast
@@ -18,6 +19,8 @@ from handeye.errors import InputError
 # The parser reads some 100 kB a second; a list of 10 000 images has 450 kB.
 MAX_BYTES = MIB // 2
 MAX_DOCUMENTS = 1000
+# Numbers as NumPy and C++ print them, 1200. and 3.e-05, get their zero: not everybody reads them without.
+_SHORT_NUMBER = re.compile(r"[+-]?\d{1,300}\.([eE][+-]?\d{1,5})?\Z", re.ASCII)
 
 
 def read_yaml(path: Path) -> object:
@@ -59,7 +62,7 @@ def _plain(node: yaml.Node | None, seen: set[int]) -> object:
         raise ValueError("aliases (*name) are not accepted")
     seen.add(id(node))
     if isinstance(node, yaml.ScalarNode):
-        return str(node.value)
+        return str(node.value).replace(".", ".0") if _SHORT_NUMBER.match(node.value) else str(node.value)
     if isinstance(node, yaml.SequenceNode):
         return [_plain(item, seen) for item in node.value]
     table: dict[str, object] = {}

@@ -130,6 +130,29 @@ def open_folder(
     DetectionError
         The target is in none of the images.
     """
+    opened = open_any(path, options, progress=progress)
+    if isinstance(opened, PosePairs):
+        raise InputError(
+            f"{opened.name}: poses of the target without pictures, expected pictures or corners",
+            code="no_pictures",
+            hint="handeye solve takes it; other commands need what the camera saw",
+        )
+    return opened
+
+
+def open_any(
+    path: str | os.PathLike[str],
+    options: SourceOptions | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> Opened | PosePairs:
+    """Read what `open_folder` reads, and sets that hold poses of the target instead of pictures.
+
+    Raises
+    ------
+    InputError, DegenerateError, DetectionError
+        As `open_folder`.
+    """
     options = options or SourceOptions()
     loaded = load(
         path,
@@ -143,7 +166,7 @@ def open_folder(
     if isinstance(loaded, LoadedRecording):
         return _of_recording(loaded, options.camera)
     if isinstance(loaded, PosePairs):
-        raise _no_points(loaded)
+        return loaded
     if isinstance(loaded, UnreadPoses):
         opened = _of_images(loaded.images, options.camera, progress or _nothing)
         raise _told_by_pictures(loaded, opened.recording, options.mounting)
@@ -255,11 +278,3 @@ def _told_by_pictures(unread: UnreadPoses, recording: Recording, mounting: Mount
     rows = unread.rows.select(kept)
     agreements = compare(rows, unread.readings, measurements.camera_poses, mountings)
     return unstated(unread, agreements, mounting_stated=mounting is not None, views=len(kept))
-
-
-def _no_points(pairs: PosePairs) -> InputError:
-    return InputError(
-        f"{pairs.name}: poses of the target without pictures, expected pictures or corners",
-        code="no_pictures",
-        hint="handeye solve takes it; other commands need what the camera saw",
-    )

@@ -174,13 +174,14 @@ def _missed(motions: FloatArray, camera_poses: FloatArray) -> tuple[float, float
             x, y = _core.closed_form(CLOSED_FORM, _rigid(motions[kept]), camera_poses[kept])
         except HandeyeError:
             break
-        errors = _errors(x @ motions @ y, camera_poses)
+        errors = chain_errors(x @ motions @ y, camera_poses)
         order = np.argsort(np.hypot(errors[0] / FITS_RAD, errors[1] / FITS_M))
         kept = np.sort(order[: max(MIN_VIEWS, int(np.ceil(KEPT_SHARE * len(motions))))])
     return None if errors is None else (float(np.median(errors[0])), float(np.median(errors[1])))
 
 
-def _errors(predicted: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
+def chain_errors(predicted: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the angles (N,) in radians and distances (N,) in metres between transforms (N, 4, 4)."""
     traces = np.einsum("nij,nij->n", predicted[:, :3, :3], seen[:, :3, :3])
     distances = np.linalg.norm(predicted[:, :3, 3] - seen[:, :3, 3], axis=1)
     return np.arccos(np.clip((traces - 1) / 2, -1, 1)), np.asarray(distances, dtype=np.float64)
