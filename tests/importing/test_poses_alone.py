@@ -45,7 +45,7 @@ def test_what_cannot_be_solved_is_refused() -> None:
     shuffled = numbered(
         [(p.T_base_flange, q.T_camera_target) for p, q in zip(good.pairs, good.pairs[::-1], strict=True)]
     )
-    with pytest.raises((SolveError, DegenerateError), match="contradict|do not report the same"):
+    with pytest.raises((SolveError, DegenerateError), match=r"contradict|do not report the same"):
         solve_poses(PosePairs("shuffled", "test", good.mounting, shuffled))
     slid = [(Pose.exp([0.1 * k, 0, 0, 0, 0, 0]), Pose.exp([0.1 * k, 0, 0.5, 0, 0, 0])) for k in range(6)]
     with pytest.raises(DegenerateError):
