@@ -56,8 +56,12 @@ check: build $(STAMPS)/dev ## format, lint, types, import directions
 	@$(BIN)/pyright --pythonpath $(BIN)/python
 	$(say) 'lint-imports'
 	@$(BIN)/lint-imports --no-logo
+	$(say) 'tools/check_modules.py'
+	@$(BIN)/python tools/check_modules.py
 
 bench: build $(STAMPS)/bench ## measure solver and scorer on this machine, side by side with their peers
+	@echo '#include <ceres/version.h>' | $${CXX:-c++} -x c++ -E - >/dev/null 2>&1 || \
+		printf '== %s\n' 'without Ceres for C++, whose rows are left out; to have them: sudo apt-get install libceres-dev'
 	$(say) 'handeye bench (about three minutes)'
 	@$(BIN)/handeye bench --output benchmarks
 
@@ -98,7 +102,7 @@ $(STAMPS)/core: $(STAMPS)/run $(RUST_SOURCES) Cargo.toml Cargo.lock pyproject.to
 FORCE:
 
 # The files it writes carry hashes and no addresses.
-lock: requirements/pins.txt pyproject.toml ## resolve requirements/*.txt anew from pyproject.toml (needs the registry)
+lock: requirements/pins.txt pyproject.toml ## resolve requirements/*.txt from pyproject.toml (needs the registry)
 	$(say) 'resolving requirements/dev.txt, run.txt and bench.txt'
 	@$(PYTHON) tools/lock.py
 

@@ -5,8 +5,8 @@ pip install python-fcl
 
 Simulated cells are driven. At every step that is planned, the poses are looked at that would be proposed one
 after the other if those before were given up: joint limits as they stand in the URDF file, collisions of the
-posture and of the straight path in joint space with FCL, on frames that are computed here anew, and whether
-the target is in the image by the true camera and the true poses of camera and target. With --rendered the
+posture and of the straight path in joint space with FCL, on frames that are computed here, and whether the
+target is in the image by the true camera and the true poses of camera and target. With --rendered the
 reached poses are counted whose picture shows the target to the detector.
 """
 
@@ -27,8 +27,8 @@ import cv2
 import numpy as np
 
 from handeye.planning.collisions import Workspace
+from handeye.planning.constraints import ViewLimits, mounted_points
 from handeye.planning.feasibility import Generator
-from handeye.planning.sieve import ViewLimits, mounted_points
 from handeye.session.configuration import Configuration, Prepared, Simulation, begin, prepare
 from handeye.session.deciding import Step
 from handeye.session.entry import Failure

@@ -4,7 +4,7 @@ Seconds are noisy, instructions are not: the same program takes the same number 
 the same vector unit. Valgrind knows AVX2 and no AVX-512, so the solver is counted on AVX2.
 
 .venv/bin/python tools/count_instructions.py            # compare
-.venv/bin/python tools/count_instructions.py --update   # write benchmarks/instructions.json anew
+.venv/bin/python tools/count_instructions.py --update   # write benchmarks/instructions.json
 """
 
 import argparse

@@ -159,7 +159,7 @@ class Printed:
     ) -> Alignment | None:
         """Where the board lies in `image` (H, W), contiguous; None where it is not there.
 
-        Places (N, 2) of the plane are expected at pixels (N, 2), give or take a margin. With `also_negative`
+        Places (N, 2) of the plane are expected at pixels (N, 2), within a margin. With `also_negative`
         ink may be lighter than paper.
         """
 
@@ -198,30 +198,18 @@ def closed_form_methods() -> list[tuple[str, str, str]]:
 # Least squares
 
 class Model:
-    """Assumptions of a solve; parameters are `xi_x (6), xi_y (6)`, pixel parameters, kinematic parameters.
+    """Assumptions of a solve, robot and camera taken as exact; parameters are `xi_x (6), xi_y (6)`.
 
-    `pixel_sigma` (K,): noise of each view in px. `robot_side`: "left" or "right" of A. `robot_roots`
-    (1 or K, 6, 6): square roots of the covariance of the robot's error there. `free_camera`: indices of free
-    camera parameters; `board_scale`: whether the size of the board is free; `pixel_prior`: their prior
-    information, in this order. `kinematic_jacobians` (K, 6, q): `A <- exp(D q) A`; `kinematic_prior` (q, q).
-    `chain_prior`: means X, Y (4, 4) and standard deviations (6,) of their twists.
+    `pixel_sigma` (K,): noise of each view in px. `chain_prior`: means X, Y (4, 4) and standard deviations
+    (6,) of their twists.
     """
 
     def __init__(
         self,
         pixel_sigma: ArrayLike,
         *,
-        robot_side: str | None = None,
-        robot_roots: ArrayLike | None = None,
-        free_camera: list[int] | None = None,
-        board_scale: bool = False,
-        pixel_prior: ArrayLike | None = None,
-        kinematic_jacobians: ArrayLike | None = None,
-        kinematic_prior: ArrayLike | None = None,
         chain_prior: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike] | None = None,
     ) -> None: ...
-    @property
-    def parameter_count(self) -> int: ...
 
 class Problem:
     """Measurements: view k holds the points `offsets[k]:offsets[k + 1]` and was taken at `A = motions[k]`."""
@@ -235,8 +223,6 @@ class Problem:
         pixels: ArrayLike,
         offsets: Sequence[int] | NDArray[int64],
         motions: ArrayLike,
-        *,
-        covariances: ArrayLike | None = None,
     ) -> None: ...
     @property
     def view_count(self) -> int: ...
@@ -246,10 +232,6 @@ class Problem:
         y: ArrayLike,
         model: Model,
         *,
-        views: list[int] | None = None,
-        method: str = "levenberg_marquardt",
-        loss: str = "squared",
-        loss_scale: float = 3.0,
         max_iterations: int = 100,
         cost_tolerance: float = 1e-10,
         step_tolerance: float = 1e-13,
@@ -266,18 +248,10 @@ class Solution:
     @property
     def y(self) -> NDArray[float64]: ...
     @property
-    def parameters(self) -> list[float]: ...
-    @property
-    def board_scale(self) -> float: ...
-    @property
-    def kinematic(self) -> list[float]: ...
-    @property
     def information(self) -> NDArray[float64]: ...
     @property
     def covariance(self) -> NDArray[float64]:
         """Inverse of the information; raises DegenerateError if that is singular."""
-    @property
-    def prior_information(self) -> NDArray[float64]: ...
     @property
     def cost(self) -> float: ...
     @property
@@ -288,20 +262,6 @@ class Solution:
     def ending(self) -> str: ...
     @property
     def is_converged(self) -> bool: ...
-    @property
-    def views(self) -> list[int]: ...
-    @property
-    def view_rmse_px(self) -> list[float]: ...
-    @property
-    def view_cost(self) -> list[float]: ...
-    @property
-    def corrections(self) -> NDArray[float64]: ...
-    @property
-    def correction_cost(self) -> list[float]: ...
-    @property
-    def poses(self) -> NDArray[float64]: ...
-    @property
-    def correction_log_determinant(self) -> float: ...
 
 class ViewSets:
     """Views linearised at X and Y, to be weighed in sets under levels of the robot's noise.

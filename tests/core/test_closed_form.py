@@ -154,7 +154,7 @@ def test_same_formula_same_answer_as_opencv(method: str) -> None:
 @pytest.mark.parametrize("method", ["andreff", "li_wang_wu"])
 def test_same_rotation_and_better_translation_than_opencv(method: str) -> None:
     """The same linear system, so the same rotations. OpenCV leaves the translations as they were before the rotation
-    was made orthogonal; we solve for them anew."""
+    was made orthogonal; we solve for them again."""
     ours, theirs = [], []
     for seed in range(100):
         truth = scene(seed, views=[4, 10, 30][seed % 3])

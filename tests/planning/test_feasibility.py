@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from handeye.errors import InputError
+from handeye.planning.constraints import ViewLimits
 from handeye.planning.feasibility import Generator
-from handeye.planning.sieve import ViewLimits
 from handeye.robots import open_arm
 from handeye.session.configuration import begin, prepare
 from handeye.solving import Measurements, make_estimator

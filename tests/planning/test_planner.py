@@ -46,7 +46,7 @@ def test_next_best_view_takes_the_largest_gain_and_entropy_falls() -> None:
         assert proposal.names[int(np.nanargmax(proposal.gains))] == proposal.candidate.name
         verdict = loop.tell(by_name[proposal.candidate.name])
         assert verdict.predicted_gain == proposal.predicted_gain
-        # The pixel noise is estimated anew with every view, and the entropy of twelve parameters with it.
+        # The pixel noise is estimated again with every view, and the entropy of twelve parameters with it.
         assert verdict.realised_gain == pytest.approx(proposal.predicted_gain, abs=1.5)
         entropies.append(verdict.estimate.entropy)
     assert proposal.reason is StopReason.VIEWS_TAKEN

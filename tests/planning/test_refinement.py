@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from handeye.planning import Planner, PlannerOptions, Proposal, make_policy
+from handeye.planning.constraints import ViewLimits
 from handeye.planning.feasibility import FeasiblePool, Generator
 from handeye.planning.refinement import Refined, Refinement, offered, refine
-from handeye.planning.sieve import ViewLimits
 from handeye.planning.travel import Travel
 from handeye.robots import ArmKinematics
 from handeye.session.configuration import Prepared, begin, prepare
@@ -40,9 +40,9 @@ class Scene:
         self.options = PlannerOptions(sight=self.drawn.sight, travel=travel)
 
     def gains(self, joints: FloatArray) -> FloatArray:
-        sieve = self.drawn.sieve
-        motions = sieve.motions(joints)
-        return self.estimate.gains(self.options.criterion, motions, sieve.sight, joints=joints)
+        constraints = self.drawn.constraints
+        motions = constraints.motions(joints)
+        return self.estimate.gains(self.options.criterion, motions, constraints.sight, joints=joints)
 
     @property
     def joints(self) -> FloatArray:
@@ -66,11 +66,11 @@ def test_what_is_climbed_to_teaches_more_and_passes_everything(mounting: Mountin
         assert one.seed_gain == drawn[names.index(one.seed)]
         assert gain > one.seed_gain
     assert scene.gains(ends).max() > drawn.max() * 1.02
-    sieve = scene.drawn.sieve
-    passed, turned_down = sieve.sift(ends)
+    constraints = scene.drawn.constraints
+    passed, turned_down = constraints.passing(ends)
     assert (len(passed), dict(turned_down)) == (len(ends), {})
     assert scene.options.travel is not None
-    assert sieve.body.obstacles_on_paths(scene.options.travel.start, ends) == [None] * len(ends)
+    assert constraints.body.obstacles_on_paths(scene.options.travel.start, ends) == [None] * len(ends)
     # By the truth as well: the whole target is in the image, away from its border.
     truth, cell = scene.prepared.truth, scene.prepared.cell
     assert truth is not None
@@ -103,9 +103,9 @@ def test_seeds_are_apart_and_reached_on_free_paths(tmp_path: Path) -> None:
     for i in range(len(seeds)):
         assert all(np.abs(seeds[i] - other).max() >= Refinement().apart_rad for other in seeds[:i])
     # From a floor that is everywhere nothing is reached.
-    body = scene.drawn.sieve.body
+    body = scene.drawn.constraints.body
     buried = replace(body, workspace=replace(body.workspace, floor_m=10.0))
-    sunk = replace(scene.drawn, sieve=replace(scene.drawn.sieve, body=buried))
+    sunk = replace(scene.drawn, constraints=replace(scene.drawn.constraints, body=buried))
     gains = scene.gains(scene.joints)
     assert refine(sunk, gains, scene.options, np.random.default_rng(0)) == []
 

@@ -97,7 +97,7 @@ def test_labels_of_a_board_that_looks_the_same_when_turned(tmp_path: Path) -> No
     made = simulated_cell(open_arm("epson_c4l"), options)
 
     class Turning:
-        """Labels the points anew in every picture, as a detector that cannot tell may."""
+        """Labels the points afresh in every picture, as a detector that cannot tell may."""
 
         def __init__(self) -> None:
             self.count = 0

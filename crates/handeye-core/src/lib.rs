@@ -3,15 +3,16 @@
 //! No Python, no files, no clock, no global randomness. Transforms are `T_to_from`; lengths are metres,
 //! angles radians, pixels have their centres at integer coordinates.
 
+mod batched_algebra;
 pub mod camera;
 pub mod closed_form;
 pub mod error;
+pub mod estimation;
 pub mod evidence;
+pub mod imaging;
 pub mod information;
 pub mod kinematics;
-mod lanes;
 pub mod least_squares;
-pub mod picture;
 pub mod planar_pose;
 pub mod planning;
 pub mod pose;

@@ -54,6 +54,26 @@ impl Factor {
         sum + product.ln()
     }
 
+    /// `m^-1 right`.
+    pub fn solve(&self, right: &[f64]) -> Vec<f64> {
+        let rows: Vec<&[f64]> = self.upper.chunks_exact(self.blocks).map(<[Block]>::as_flattened).collect();
+        let mut solution = right.to_vec();
+        for k in 0..self.size {
+            let value = solution[k] / rows[k][k];
+            for i in k + 1..self.size {
+                solution[i] -= rows[k][i] * value;
+            }
+        }
+        for k in (0..self.size).rev() {
+            let mut value = solution[k];
+            for i in k + 1..self.size {
+                value -= rows[k][i] * solution[i];
+            }
+            solution[k] = value / rows[k][k];
+        }
+        solution
+    }
+
     /// `m^-1`; not finite where it overflows.
     pub fn inverse(&self) -> DMatrix<f64> {
         let mut rows = vec![[0.0; MAX_LANES]; 2 * self.size * self.blocks];

@@ -4,9 +4,13 @@
 //! Perturbations act on the left: `T <- exp(xi) T`.
 //! Formulas follow Barfoot, "State Estimation for Robotics" (2nd ed., 2024), chapter 8.
 
+mod batched;
+
 use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3, Vector6};
 
 use crate::error::Error;
+
+pub(crate) use batched::{entries, left_product, right_product};
 
 /// Largest deviation of `R' R` from the identity that is taken as rounding and repaired.
 pub const RIGID_TOLERANCE: f64 = 1e-4;

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use handeye_core::picture::alignment::Alignment as CoreAlignment;
-use handeye_core::picture::plane_map::PlaneMap as CoreMap;
-use handeye_core::picture::printed::Printed as CorePrinted;
+use handeye_core::imaging::alignment::Alignment as CoreAlignment;
+use handeye_core::imaging::plane_map::PlaneMap as CoreMap;
+use handeye_core::imaging::printed::Printed as CorePrinted;
 use nalgebra::{Matrix2, Vector2};
 use numpy::{PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::convert::{self, Array};
 use crate::errors::{invalid, to_python};
-use crate::picture::picture;
+use crate::imaging::picture;
 
 /// Registers the classes of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -198,11 +198,7 @@ impl Compressed {
             return Err(invalid(py, &format!("camera parameter {i} of a lens with {count}")));
         }
         let columns = free.len() + usize::from(board_scale);
-        let parameters = (columns > 0).then(|| PixelParameters {
-            prior_information: DMatrix::zeros(columns, columns),
-            camera: free,
-            board_scale,
-        });
+        let parameters = (columns > 0).then_some(PixelParameters { camera: free, board_scale });
         let views = py
             .detach(|| {
                 poses
@@ -334,7 +330,7 @@ fn start_slack() -> Matrix6<f64> {
 }
 
 /// What is believed after some views.
-#[pyclass(frozen, module = "handeye._core")]
+#[pyclass(frozen, name = "OldPosterior", module = "handeye._core")]
 pub struct Posterior {
     inner: CorePosterior,
     hypotheses: Vec<Hypothesis>,

@@ -5,7 +5,7 @@ use handeye_core::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, ToolPoint, Trace,
 };
 use handeye_core::information::{
-    Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, Sight, Supposition,
+    Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, Supposition, Visibility,
 };
 use handeye_core::least_squares::{PixelParameters, Side};
 use handeye_core::simd::VectorUnit;
@@ -169,7 +169,7 @@ pub struct Predictor {
     pixel_parameters: Option<PixelParameters>,
     free_joints: Vec<usize>,
     joint_noise: Option<Vec<f64>>,
-    sight: Sight,
+    visibility: Visibility,
 }
 
 impl Predictor {
@@ -232,7 +232,7 @@ impl Predictor {
             robot: self.robot,
             pixel_parameters: self.pixel_parameters.as_ref(),
             kinematic_count: self.free_joints.len(),
-            sight: self.sight,
+            visibility: self.visibility,
         }
     }
 }
@@ -271,11 +271,7 @@ impl Predictor {
         let robot = robot(py, robot_side, robot_root.as_ref())?;
         let free = free_camera.unwrap_or_default();
         let count = free.len() + usize::from(board_scale);
-        let pixel_parameters = (count > 0).then(|| PixelParameters {
-            camera: free,
-            board_scale,
-            prior_information: DMatrix::zeros(count, count),
-        });
+        let pixel_parameters = (count > 0).then_some(PixelParameters { camera: free, board_scale });
         Ok(Self {
             camera: camera(py, lens, &parameters)?,
             x: convert::transform(py, "x", &x)?,
@@ -286,7 +282,7 @@ impl Predictor {
             pixel_parameters,
             free_joints: free_joints.unwrap_or_default(),
             joint_noise,
-            sight: Sight { image: image_size.map(|(w, h)| [w, h]), margin_px, fewest },
+            visibility: Visibility { image: image_size.map(|(w, h)| [w, h]), margin_px, fewest },
         })
     }
 

@@ -1,8 +1,6 @@
 //! The assumptions of a solve, as a Python value.
 
-use handeye_core::least_squares::{
-    ChainPrior, KinematicParameters, Model as CoreModel, PixelParameters, RobotNoise, Side,
-};
+use handeye_core::least_squares::{ChainPrior, Model as CoreModel, Side};
 use nalgebra::{DMatrix, SVector};
 use pyo3::prelude::*;
 
@@ -14,7 +12,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Model>()
 }
 
-/// What a solve believes about noise and about parameters known only roughly.
+/// What a solve believes about noise, and about `X` and `Y` beforehand.
 #[pyclass(frozen, module = "handeye._core")]
 pub struct Model {
     pub inner: CoreModel,
@@ -49,50 +47,12 @@ fn twist(py: Python<'_>, name: &str, array: &Array<'_>) -> PyResult<SVector<f64,
 #[pymethods]
 impl Model {
     #[new]
-    #[pyo3(signature = (
-        pixel_sigma, *, robot_side=None, robot_roots=None, free_camera=None, board_scale=false,
-        pixel_prior=None, kinematic_jacobians=None, kinematic_prior=None, chain_prior=None,
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "one keyword per assumption")]
+    #[pyo3(signature = (pixel_sigma, *, chain_prior=None))]
     fn new<'py>(
         py: Python<'py>,
         pixel_sigma: Array<'py>,
-        robot_side: Option<&str>,
-        robot_roots: Option<Array<'py>>,
-        free_camera: Option<Vec<usize>>,
-        board_scale: bool,
-        pixel_prior: Option<Array<'py>>,
-        kinematic_jacobians: Option<Array<'py>>,
-        kinematic_prior: Option<Array<'py>>,
         chain_prior: Option<(Array<'py>, Array<'py>, Array<'py>, Array<'py>)>,
     ) -> PyResult<Self> {
-        let robot = match (robot_side, robot_roots) {
-            (None, None) => None,
-            (Some(name), Some(roots)) => Some(RobotNoise {
-                side: side(py, name)?,
-                square_roots: convert::matrices::<6, 6>(py, "robot_roots", &roots)?,
-            }),
-            _ => return Err(invalid(py, "robot_side and robot_roots go together")),
-        };
-        let camera = free_camera.unwrap_or_default();
-        let pixel_parameters = if camera.is_empty() && !board_scale {
-            None
-        } else {
-            let count = camera.len() + usize::from(board_scale);
-            let prior_information = match pixel_prior {
-                Some(prior) => square(py, "pixel_prior", &prior)?,
-                None => DMatrix::zeros(count, count),
-            };
-            Some(PixelParameters { camera, board_scale, prior_information })
-        };
-        let kinematic = match (kinematic_jacobians, kinematic_prior) {
-            (None, None) => None,
-            (Some(jacobians), Some(prior)) => Some(KinematicParameters {
-                jacobians: jacobian_list(py, &jacobians)?,
-                prior_information: square(py, "kinematic_prior", &prior)?,
-            }),
-            _ => return Err(invalid(py, "kinematic_jacobians and kinematic_prior go together")),
-        };
         let chain_prior = chain_prior
             .map(|(x, y, sigma_x, sigma_y)| {
                 PyResult::Ok(ChainPrior {
@@ -104,20 +64,8 @@ impl Model {
             })
             .transpose()?;
         Ok(Self {
-            inner: CoreModel {
-                pixel_sigma: convert::scalars(py, "pixel_sigma", &pixel_sigma)?,
-                robot,
-                pixel_parameters,
-                kinematic,
-                chain_prior,
-            },
+            inner: CoreModel { pixel_sigma: convert::scalars(py, "pixel_sigma", &pixel_sigma)?, chain_prior },
         })
-    }
-
-    /// Number of global parameters.
-    #[getter]
-    fn parameter_count(&self) -> usize {
-        self.inner.parameter_count()
     }
 }
 

@@ -45,7 +45,7 @@ def run(arguments: Sequence[str]) -> int:
         _complain("interrupted")
         return ExitCode.INTERRUPTED
     except (BrokenPipeError, SystemExit):  # rich makes the second of the first
-        _silence_stdout()  # whoever read has seen enough
+        _silence_stdout()  # the reader has seen enough
         return ExitCode.OUTPUT
     except OSError as error:
         if _is_about_stdout(error):

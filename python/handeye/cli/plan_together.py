@@ -8,7 +8,7 @@ import numpy as np
 
 from handeye.cli.failures import UsageError
 from handeye.planning import Candidate, Pool
-from handeye.planning.joint import OBJECTIVES, JointPlan, plan_jointly
+from handeye.planning.batch import OBJECTIVES, BatchPlan, plan_batch
 from handeye.planning.ordering import METRES_PER_RADIAN, Measure, Route, travel_order
 from handeye.robots import ArmKinematics
 from handeye.solving import Estimate, Sight
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class Together:
     """Views chosen at once, and the way through them."""
 
-    plan: JointPlan
+    plan: BatchPlan
     route: Route
     present: str
     speed_rad_s: float
@@ -67,7 +67,7 @@ def choose_together(
         No choice determines the answer.
     """
     points = None if tool_point_m is None else [tool_point_m]
-    plan = plan_jointly(estimate, pool, count, objective=criterion, tool_points_m=points, sight=sight)
+    plan = plan_batch(estimate, pool, count, objective=criterion, tool_points_m=points, sight=sight)
     here = Candidate(present.name, present.T_base_flange, present.joints_rad)
     velocities = None if kinematics is None else kinematics.arm.velocities
     route = travel_order(plan.candidates, here, velocities=velocities, speed_rad_s=speed_rad_s)

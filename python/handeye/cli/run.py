@@ -18,7 +18,7 @@ from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
 from handeye.notations import SHOWN
 from handeye.planning.collisions import Body
-from handeye.planning.sieve import ViewLimits
+from handeye.planning.constraints import ViewLimits
 from handeye.robots.manual import describe
 from handeye.robots.protocol import Goal
 from handeye.session.attempt import Patience

@@ -144,7 +144,7 @@ def _offset(offset: JointOffset) -> str:
     values = offset.to_dict()
     unit = "mm" if offset.sliding else "deg"
     value, sigma = values[f"offset_{unit}"], values[f"sigma_{unit}"]
-    return f"{value:+.4f} {unit} beyond where it is read, give or take {sigma:.4f}"
+    return f"{value:+.4f} {unit} beyond where it is read, standard deviation {sigma:.4f}"
 
 
 def _noise(calibration: Calibration) -> str:

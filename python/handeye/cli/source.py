@@ -79,7 +79,9 @@ class Source:
     def _target(self) -> tuple[Target | None, tuple[int, int] | None]:
         if self.target is not None:
             if (self.rows, self.columns, self.pitch_mm) != (None, None, None):
-                raise UsageError("--target says it all", hint="leave --rows, --columns and --pitch-mm away")
+                raise UsageError(
+                    "--target describes the whole target", hint="do not give --rows, --columns or --pitch-mm"
+                )
             return read_target(self.target), None
         if self.rows is None or self.columns is None:
             if (self.rows, self.columns, self.pitch_mm) != (None, None, None):

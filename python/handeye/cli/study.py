@@ -103,7 +103,7 @@ class Data:
     sets: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = ()
     """Names of the sets, if not the usual ones of the study: any folders that `handeye solve` reads."""
     no_cache: bool = False
-    """Look for the target anew, and remember nothing."""
+    """Look for the target again, and remember nothing."""
 
     def load(self, usual: Sequence[str], workers: int) -> "list[Recording]":
         """Return the recordings, `usual` ones unless named.
@@ -291,8 +291,8 @@ def injected(
 ) -> Answer:
     """Add noise to the robot poses of a simulated set, its levels not told, and compare with the truth.
 
-    On the base side 0.225 mm and 0.0169 deg per axis, on the flange side 0.15 mm and 0.01125 deg, drawn anew
-    for each random start.
+    On the base side 0.225 mm and 0.0169 deg per axis, on the flange side 0.15 mm and 0.01125 deg, drawn
+    again for each random start.
     """
     from handeye.evaluation.data import SIMULATED_SETS  # noqa: PLC0415
     from handeye.evaluation.studies import study_injected  # noqa: PLC0415

@@ -34,7 +34,7 @@ _OWN = {
 @Parameter(name="*", group="Measures")
 @dataclass(frozen=True)
 class Asked:
-    """Measures of the target; what is left away is chosen, lengths as large as the paper allows."""
+    """Measures of the target; what is not given is chosen, lengths as large as the paper allows."""
 
     rows: int | None = None
     """Rows of inner corners (chessboard), circles, squares (charuco) or tags."""
@@ -154,7 +154,7 @@ def _target(family: str, measures: Asked, paper: Paper) -> Target:
     if name in BOARDS or Path(family).suffix.lower() not in {".toml", ".json"}:
         return measures.target(name, paper)
     if measures != Asked():
-        raise UsageError("the file says all measures", hint="leave them away, or name a family instead")
+        raise UsageError("the file says all measures", hint="give no measures, or name a family instead")
     return read_target(family)
 
 

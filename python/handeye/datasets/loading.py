@@ -57,7 +57,7 @@ def load(
     layout
         Name of one of `IMPORTERS`; None to recognise it.
     target, pattern, mounting, poses, stated
-        What the files of others leave open, see `ImportOptions`; not for a recording, which says it all.
+        What the files of others leave open, see `ImportOptions`; a recording leaves nothing open.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def load(
             raise InputError(
                 f"{folder}: a recording says its target, mounting and poses itself",
                 code="options_unused",
-                hint=f"leave the options away, or change {recording_format.FILE_NAME}",
+                hint=f"leave the options out, or change {recording_format.FILE_NAME}",
             )
         return recording_format.read_recording(folder)
     if poses is not None or options.stated != NOTHING_STATED:

@@ -56,7 +56,7 @@ class Statement:
                 raise InputError(
                     f"{mine} is stated, but the file says {theirs}",
                     code="contradiction",
-                    hint="leave the option away, or correct the file",
+                    hint="leave the option out, or correct the file",
                 )
         return Statement(
             self.notation or other.notation, self.unit or other.unit, self.direction or other.direction
@@ -107,7 +107,7 @@ class PoseRows:
     degrees
         Whether the file says that its angles are in degrees or radians; None if it does not.
     has_time
-        Whether a column of times was left away.
+        Whether a column of times was left out.
     """
 
     file: Path

@@ -27,7 +27,7 @@ START_FOCALS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
 # Views that choose among them.
 START_VIEWS = 8
 # From which a lens is chosen, where none is asked for. Ordinary views cannot tell further coefficients
-# from each other: whoever has a lens that needs them says so.
+# from each other: a lens that needs them has to be named.
 CHOICE = ("pinhole", "brown_conrady_4", "brown_conrady_5")
 # No detection is better: lenses that all fit to less are equally good.
 LEAST_NOISE_PX = 1e-3

@@ -19,7 +19,7 @@ SMALLEST_PERIMETER_SHARE = 0.015
 TOLERANCE = 0.3
 CONSISTENT_SHARE = 0.75
 NEIGHBOURS = 12
-# Corners are weighed anew so many times; those closer than this to where they should be all count the same.
+# Corners are weighed so many times; those closer than this to where they should be all count the same.
 WEIGHINGS = 5
 FINEST_PX = 0.05
 # A marker has its number where its bits agree so well with those printed; those of other numbers differ in a

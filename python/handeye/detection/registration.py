@@ -106,7 +106,7 @@ def drawn(target: Target, plane: FloatArray) -> FloatArray:
 def aligned(
     image: Image, target: Target, plane: FloatArray, pixels: FloatArray, margin_px: float
 ) -> Aligned | None:
-    """Return where a target lies whose places (N, 2) are expected at pixels (N, 2), give or take a margin.
+    """Return where a target lies whose places (N, 2) are expected at pixels (N, 2), within a margin.
 
     None where it is not there. What is found is not yet proved to be that target: a grid may be a line off,
     a marker may be another one, and what is hidden is not known.

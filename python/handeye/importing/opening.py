@@ -1,4 +1,4 @@
-"""One door for whoever has a folder: recordings pass, images are searched for the target first."""
+"""One entry for folders: recordings pass, images are searched for the target first."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -174,7 +174,7 @@ def open_any(
 
 
 def _nothing(done: int, total: int) -> None:
-    """Be the progress of whoever wants none."""
+    """Report no progress."""
 
 
 def _of_recording(loaded: LoadedRecording, camera: Camera | None) -> Opened:
@@ -264,7 +264,7 @@ def _check_size(camera: Camera, size: tuple[int, int], what: str) -> None:
             f"the camera is calibrated for {camera.width_px} x {camera.height_px} pixels, {what} have "
             f"{size[0]} x {size[1]}",
             code="image_size",
-            hint="give the calibration at the size of the pictures, or leave the camera away: it is then "
+            hint="give the calibration at the size of the pictures, or leave the camera out: it is then "
             "calibrated from the pictures",
         )
 

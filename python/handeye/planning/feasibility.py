@@ -7,7 +7,7 @@ import numpy as np
 
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Body, Workspace
-from handeye.planning.sieve import Sieve, ViewLimits, mounted_points, sight_of
+from handeye.planning.constraints import ViewConstraints, ViewLimits, mounted_points, sight_of
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
 from handeye.solving.estimate import Estimate, Sight
@@ -22,12 +22,12 @@ class FeasiblePool:
     pool: Pool
     joints: Mapping[str, FloatArray]
     turned_down: Mapping[str, int]
-    sieve: Sieve
+    constraints: ViewConstraints
 
     @property
     def sight(self) -> Sight:
         """What every candidate shows of the target."""
-        return self.sieve.sight
+        return self.constraints.sight
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class Generator:
         taken = np.array(postures, dtype=np.float64)
         joints = np.concatenate([self._on_shell(estimate, taken, random), self._in_joints(taken, random)])
         unreached = self.around_target + self.around_postures - len(joints)
-        sieve = Sieve(
+        constraints = ViewConstraints(
             self.body(estimate),
             estimate,
             self.limits,
@@ -98,14 +98,14 @@ class Generator:
             taken,
             np.array(shunned, dtype=np.float64),
         )
-        passed, turned_down = sieve.sift(joints)
+        passed, turned_down = constraints.passing(joints)
         joints = joints[passed]
         turned_down["the arm does not reach the pose"] = unreached
         width = len(str(len(joints)))
         names = [f"{prefix}_{i:0{width}d}" for i in range(1, len(joints) + 1)]
         found = {name: count for name, count in turned_down.items() if count > 0}
         pool = candidates_at(self.arm, names, joints)
-        return FeasiblePool(pool, dict(zip(names, joints, strict=True)), found, sieve)
+        return FeasiblePool(pool, dict(zip(names, joints, strict=True)), found, constraints)
 
     def _on_shell(self, estimate: Estimate, taken: FloatArray, random: np.random.Generator) -> FloatArray:
         """Joints (M, n) of camera poses that look at the target from all around, rolled."""

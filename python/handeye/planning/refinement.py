@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from handeye import _core
 from handeye.planning.candidates import Candidate
+from handeye.planning.constraints import ViewConstraints
 from handeye.planning.feasibility import FeasiblePool, candidates_at
 from handeye.planning.planner import PlannerOptions
 from handeye.planning.policies import Policy
-from handeye.planning.sieve import Sieve
 from handeye.planning.travel import Travel
 from handeye.robots import Arm
 from handeye.solving.estimate import Estimate
@@ -79,8 +79,8 @@ def refine(
 ) -> list[Refined]:
     """Climb from the best candidates; return where it ended, as far as it led anywhere.
 
-    Every posture on the way passes the sieve of the pool and is reached on a free straight path from where
-    the arm stands. The climb looks at the likeliest hypothesis about the robot's noise only, so what it
+    Every posture on the way passes the constraints of the pool and is reached on a free straight path from
+    where the arm stands. The climb looks at the likeliest hypothesis about the robot's noise only, so what it
     returns is to be scored like any candidate before it is taken.
 
     Parameters
@@ -103,7 +103,7 @@ def refine(
     worth = options.policy.worth(gains, options.travel.seconds(joints))
     if worth is None:
         return []
-    scorer = _Scorer(drawn.sieve, options.policy, options.criterion, options.travel)
+    scorer = _Scorer(drawn.constraints, options.policy, options.criterion, options.travel)
     seeds = _seeds(joints, worth, settings)
     seeds = seeds[scorer.is_free(joints[seeds])]
     if len(seeds) == 0:
@@ -127,21 +127,28 @@ def offered(refined: Sequence[Refined], arm: Arm) -> tuple[Candidate, ...]:
 class _Scorer:
     """Scores postures under the likeliest hypothesis, as the policy weighs them."""
 
-    def __init__(self, sieve: Sieve, policy: Policy, criterion: _core.Criterion, travel: Travel) -> None:
-        self._sieve, self._policy, self._criterion, self._travel = sieve, policy, criterion, travel
-        estimate: Estimate = sieve.estimate
+    def __init__(
+        self, constraints: ViewConstraints, policy: Policy, criterion: _core.Criterion, travel: Travel
+    ) -> None:
+        self._constraints, self._policy, self._criterion, self._travel = (
+            constraints,
+            policy,
+            criterion,
+            travel,
+        )
+        estimate: Estimate = constraints.estimate
         hypothesis = estimate.averaged[0][1]
         self._belief = _core.Belief(hypothesis.information)
-        self._predictor = estimate.predictor(hypothesis, sieve.sight)
+        self._predictor = estimate.predictor(hypothesis, constraints.sight)
 
     def __call__(self, joints: FloatArray) -> FloatArray:
         """(N,) worth of postures (N, n); NaN for what cannot be taken."""
-        passed, _ = self._sieve.sift(joints)
+        passed, _ = self._constraints.passing(joints)
         worth = np.full(len(joints), np.nan)
         if len(passed) > 0:
             some = joints[passed]
-            jacobians = self._sieve.estimate.jacobians(some)
-            motions = self._sieve.motions(some)
+            jacobians = self._constraints.estimate.jacobians(some)
+            motions = self._constraints.motions(some)
             gains = self._predictor.gains(self._belief, self._criterion, motions, jacobians=jacobians)
             weighed = self._policy.worth(gains, self._travel.seconds(some))
             worth[passed] = gains if weighed is None else weighed
@@ -149,7 +156,7 @@ class _Scorer:
 
     def is_free(self, joints: FloatArray) -> NDArray[np.bool_]:
         """(N,) whether the straight paths to postures (N, n) are free."""
-        why = self._sieve.body.obstacles_on_paths(self._travel.start, joints)
+        why = self._constraints.body.obstacles_on_paths(self._travel.start, joints)
         return np.array([reason is None for reason in why], dtype=bool)
 
 

@@ -31,7 +31,7 @@ def _obstacles(estimate: Estimate, poses: FloatArray, sight: Sight) -> list[str 
     needed = sight.fewest or count
     points = target.points @ poses[:, :3, :3].transpose(0, 2, 1) + poses[:, None, :3, 3]
     in_front = np.count_nonzero(points[:, :, 2] > 0, axis=1)
-    # The target's z axis points away from whoever sees its face.
+    # The target's z axis points away from a camera that sees its face.
     from_behind = np.einsum("ki,ki->k", poses[:, :3, 2], poses[:, :3, 3]) < 0
     pixels, seen = camera.project(points.reshape(-1, 3))
     low, high = sight.margin_px, np.array(camera.size_px) - 1 - sight.margin_px

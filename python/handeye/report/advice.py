@@ -19,7 +19,7 @@ _ADVICE = {
         "used as they are, solve without the arm: that answer fits them better."
     ),
     "blame_camera": (
-        "Calibrate the camera anew, with the focus and the size of image that are used here, and the board "
+        "Calibrate the camera again, with the focus and the size of image that are used here, and the board "
         "near all edges of the image."
     ),
     "blame_board_scale": (

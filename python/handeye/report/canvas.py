@@ -14,7 +14,7 @@ class Canvas:
     """
 
     def __init__(self, width: float, height: float, label: str) -> None:
-        """Begin an empty picture; `label` says what it shows to whoever cannot see it."""
+        """Begin an empty picture; `label` describes it to those who cannot see it."""
         self.width = width
         self.height = height
         self._label = label

@@ -12,7 +12,7 @@ from handeye.types.pose import Pose
 def displaced(arm: Arm, twists: FloatArray) -> Arm:
     """Return the arm with each joint displaced by a twist (n, 6) in its own frame; limits are lifted.
 
-    Where base and flange are is a matter of names: the first joint stays, and of the last what moves or turns
+    Where base and flange are is a gauge freedom: the first joint stays, and of the last what moves or turns
     it along its own axis.
     """
     told = np.array(twists, dtype=np.float64)

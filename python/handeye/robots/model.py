@@ -89,7 +89,7 @@ class Arm:
         self._chain  # noqa: B018 - checks what the core checks
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave the core's copy behind: it is made anew where the arm is unpacked."""
+        """Leave the core's copy behind: it is made again where the arm is unpacked."""
         return {key: value for key, value in self.__dict__.items() if key != "_chain"}
 
     @cached_property

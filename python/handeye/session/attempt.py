@@ -123,7 +123,7 @@ def attempt(
     cell
         Where.
     goal
-        Where to go; it has been checked by whoever chose it, and the workspace is checked here again.
+        Where to go; it has been checked where it was chosen, and the workspace is checked here again.
     digests
         Of the images so far: a picture that comes again is no new picture.
     timings

@@ -9,9 +9,9 @@ import numpy as np
 
 from handeye.planning import Planner, PlannerOptions, Stop, StopReason
 from handeye.planning.collisions import Body, Workspace
+from handeye.planning.constraints import ViewLimits
 from handeye.planning.feasibility import Generator
 from handeye.planning.refinement import offered, refine
-from handeye.planning.sieve import ViewLimits
 from handeye.planning.solids import SolidLinks
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics
@@ -104,7 +104,7 @@ class ArmChooser:
                 return Halt(
                     EndReason.NO_START,
                     f"the target is not seen where the arm stands: {missed[-1].detail}; drive it so that the "
-                    "camera sees the whole target, and begin anew",
+                    "camera sees the whole target, and begin again",
                 )
         places = len({entry.goal_joints for entry in missed})
         found = starting_goal(self._start, views, places, self._camera, self._body)
@@ -160,7 +160,7 @@ class ArmChooser:
                 answer = planner.ask()
         while not isinstance(answer, Stop):
             name = answer.candidate.name
-            why = drawn.sieve.body.obstacle_on_path(standing, joints_of[name])
+            why = drawn.constraints.body.obstacle_on_path(standing, joints_of[name])
             if why is None:
                 more: dict[str, Any] = {"turned_down": turned_down, "margin_px": drawn.sight.margin_px}
                 if name in climbed:

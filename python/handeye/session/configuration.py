@@ -13,8 +13,8 @@ from handeye.cameras.simulated import Optics
 from handeye.errors import InputError
 from handeye.importing import SourceOptions, open_folder
 from handeye.planning.collisions import Workspace
+from handeye.planning.constraints import ViewLimits
 from handeye.planning.policies import make_policy
-from handeye.planning.sieve import ViewLimits
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm, open_arm, shipped_arms
 from handeye.robots.protocol import Goal

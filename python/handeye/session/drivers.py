@@ -32,7 +32,7 @@ CAMERAS = ("simulated", "folder", "opencv", REPLAY)
 
 @dataclass(frozen=True)
 class Person:
-    """How to talk to whoever sits in front of it."""
+    """How to talk to the person in front of it."""
 
     ask: Callable[[str], str]
     tell: Callable[[str], None]

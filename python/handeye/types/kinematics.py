@@ -1,6 +1,6 @@
 """What an estimate needs of an arm: how its joints move the middle of the chain.
 
-An arm itself is the business of `handeye.robots`; whoever estimates or plans knows it only so.
+An arm itself is the business of `handeye.robots`; estimation and planning know only this much of it.
 """
 
 from typing import Protocol

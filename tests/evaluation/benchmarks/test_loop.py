@@ -4,14 +4,14 @@ import pytest
 
 from handeye.evaluation.benchmarks.loop import CELL, bench_loop
 from handeye.evaluation.benchmarks.options import Options
-from handeye.planning.sieve import Sieve
+from handeye.planning.constraints import ViewConstraints
 from handeye.session import attempt, loop
 
 
 def test_every_stage_of_a_planned_step_takes_time_and_none_is_counted_twice() -> None:
-    before = (vars(attempt)["detect"], Sieve.sift, vars(loop)["make_estimator"])
+    before = (vars(attempt)["detect"], ViewConstraints.passing, vars(loop)["make_estimator"])
     found = bench_loop(Options(quick=True), lambda done, total: None)
-    assert (vars(attempt)["detect"], Sieve.sift, vars(loop)["make_estimator"]) == before
+    assert (vars(attempt)["detect"], ViewConstraints.passing, vars(loop)["make_estimator"]) == before
     assert found["steps"] == 2
     stages = found["stages"]
     for name in (

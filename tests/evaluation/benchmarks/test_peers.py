@@ -89,3 +89,18 @@ def test_a_source_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(programs, "PLACES", ())
     with pytest.raises(MissingPeerError, match="was not found"):
         programs.built("ceres_solve", [])
+
+
+@pytest.mark.parametrize(
+    "why",
+    ["a.cpp:3:10: fatal error: ceres/ceres.h: No such file", "ld: cannot find -lceres", "cannot find -lglog"],
+)
+def test_without_ceres_for_cpp_the_command_that_brings_it_is_named(
+    monkeypatch: pytest.MonkeyPatch, why: str
+) -> None:
+    def built(name: str, _libraries: list[str]) -> None:
+        raise MissingPeerError(f"{name}.cpp did not compile: {why}")
+
+    monkeypatch.setattr(programs, "built", built)
+    with pytest.raises(MissingPeerError, match="apt-get install libceres-dev"):
+        programs.ceres_solve()

@@ -9,12 +9,12 @@
 //! y' = y N/D + p1 (s + 2 y^2) + 2 p2 x y + s3 s + s4 s^2
 //! ```
 
-use nalgebra::Matrix2;
+#![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 
+use super::distortion::DistortedPoint;
+use super::lens::Parameters;
 use super::region::{self, MAX_SQUARED_RADIUS};
-use super::{Bent, MAX_PARAMETERS, ParameterJacobian};
-
-type Parameters = [f64; MAX_PARAMETERS];
+use crate::simd::{Simd, Vector};
 
 /// Coefficients of the numerator `N` and denominator `D`, lowest power first.
 #[inline]
@@ -23,73 +23,87 @@ fn fraction(p: &Parameters) -> ([f64; 4], [f64; 4]) {
 }
 
 /// The point after the lens; `RATIONAL` and `PRISM` say whether `k4..k6` and `s1..s4` can differ from zero.
-#[inline]
-pub(super) fn bend<const RATIONAL: bool, const PRISM: bool>(p: &Parameters, x: f64, y: f64) -> Bent {
-    let (k1, k2, p1, p2, k3) = (p[4], p[5], p[6], p[7], p[8]);
+#[inline(always)]
+pub(crate) fn distort<S: Simd, const RATIONAL: bool, const PRISM: bool>(
+    simd: S,
+    p: &Parameters,
+    x: S::Vector,
+    y: S::Vector,
+) -> DistortedPoint<S::Vector> {
     let (xx, yy, xy) = (x * x, y * y, x * y);
     let s = xx + yy;
-    let mut radial = 1.0 + s * (k1 + s * (k2 + s * k3));
-    let mut slope = k1 + s * (2.0 * k2 + 3.0 * s * k3);
+    let (mut radial, mut twice_slope) = cubic(simd, [p[4], p[5], p[8]], s);
+    let mut inverse_denominator = simd.splat(1.0);
     if RATIONAL {
-        let (k4, k5, k6) = (p[9], p[10], p[11]);
-        let inverse = 1.0 / (1.0 + s * (k4 + s * (k5 + s * k6)));
-        radial *= inverse;
-        slope = (slope - radial * (k4 + s * (2.0 * k5 + 3.0 * s * k6))) * inverse;
+        let (denominator, twice_rise) = cubic(simd, [p[9], p[10], p[11]], s);
+        inverse_denominator = inverse_denominator / denominator;
+        radial = radial * inverse_denominator;
+        twice_slope = radial.neg_mul_add(twice_rise, twice_slope) * inverse_denominator;
     }
-    let cross = 2.0 * (xy * slope + p1 * x + p2 * y);
-    let mut bent = Bent {
-        x: x * radial + 2.0 * p1 * xy + p2 * (s + 2.0 * xx),
-        y: y * radial + p1 * (s + 2.0 * yy) + 2.0 * p2 * xy,
-        jacobian: Matrix2::new(
-            radial + 2.0 * (xx * slope + p1 * y) + 6.0 * p2 * x,
-            cross,
-            cross,
-            radial + 2.0 * (yy * slope + p2 * x) + 6.0 * p1 * y,
-        ),
+    let (p1, p2) = (simd.splat(2.0 * p[6]), simd.splat(2.0 * p[7]));
+    let (half_p1, half_p2) = (simd.splat(p[6]), simd.splat(p[7]));
+    let cross = xy.mul_add(twice_slope, p1.mul_add(x, p2 * y));
+    let two = simd.splat(2.0);
+    let mut distorted = DistortedPoint {
+        x: x.mul_add(radial, p1.mul_add(xy, half_p2 * two.mul_add(xx, s))),
+        y: y.mul_add(radial, p2.mul_add(xy, half_p1 * two.mul_add(yy, s))),
+        along_x: xx.mul_add(twice_slope, p1.mul_add(y, simd.splat(6.0 * p[7]).mul_add(x, radial))),
+        cross_x: cross,
+        cross_y: cross,
+        along_y: yy.mul_add(twice_slope, p2.mul_add(x, simd.splat(6.0 * p[6]).mul_add(y, radial))),
+        squared_radius: s,
+        radial,
+        inverse_denominator,
     };
     if PRISM {
         let (s1, s2, s3, s4) = (p[12], p[13], p[14], p[15]);
-        bent.x += s * (s1 + s * s2);
-        bent.y += s * (s3 + s * s4);
-        let (along_x, along_y) = (2.0 * (s1 + 2.0 * s * s2), 2.0 * (s3 + 2.0 * s * s4));
-        bent.jacobian += Matrix2::new(along_x * x, along_x * y, along_y * x, along_y * y);
+        distorted.x = simd.splat(s2).mul_add(s, simd.splat(s1)).mul_add(s, distorted.x);
+        distorted.y = simd.splat(s4).mul_add(s, simd.splat(s3)).mul_add(s, distorted.y);
+        let along_x = simd.splat(4.0 * s2).mul_add(s, simd.splat(2.0 * s1));
+        let along_y = simd.splat(4.0 * s4).mul_add(s, simd.splat(2.0 * s3));
+        distorted.along_x = along_x.mul_add(x, distorted.along_x);
+        distorted.cross_x = along_x.mul_add(y, distorted.cross_x);
+        distorted.cross_y = along_y.mul_add(x, distorted.cross_y);
+        distorted.along_y = along_y.mul_add(y, distorted.along_y);
     }
-    bent
+    distorted
 }
 
-/// Derivative of the point after the lens in the coefficients: columns 4 to `COUNT` of `out`.
-#[inline]
-pub(super) fn coefficients<const COUNT: usize>(p: &Parameters, x: f64, y: f64, out: &mut ParameterJacobian) {
-    let s = x * x + y * y;
-    let mut set = |column: usize, dx: f64, dy: f64| {
-        out[(0, column)] = dx;
-        out[(1, column)] = dy;
+/// `1 + c1 s + c2 s^2 + c3 s^3` and twice its derivative.
+#[inline(always)]
+fn cubic<S: Simd>(simd: S, c: [f64; 3], s: S::Vector) -> (S::Vector, S::Vector) {
+    let value = simd.splat(c[2]).mul_add(s, simd.splat(c[1])).mul_add(s, simd.splat(c[0]));
+    let slope = simd.splat(6.0 * c[2]).mul_add(s, simd.splat(4.0 * c[1])).mul_add(s, simd.splat(2.0 * c[0]));
+    (value.mul_add(s, simd.splat(1.0)), slope)
+}
+
+/// Derivative of the point after the lens in a distortion coefficient, by its place among the parameters.
+#[inline(always)]
+pub(crate) fn coefficient_derivative<S: Simd>(
+    simd: S,
+    parameter: usize,
+    x: S::Vector,
+    y: S::Vector,
+    distorted: &DistortedPoint<S::Vector>,
+) -> (S::Vector, S::Vector) {
+    let zero = simd.splat(0.0);
+    let two = simd.splat(2.0);
+    let s = distorted.squared_radius;
+    let radial = match parameter {
+        4 => distorted.inverse_denominator * s,
+        5 => distorted.inverse_denominator * s * s,
+        8 => distorted.inverse_denominator * s * s * s,
+        9 => -(distorted.radial * distorted.inverse_denominator * s),
+        10 => -(distorted.radial * distorted.inverse_denominator * s * s),
+        11 => -(distorted.radial * distorted.inverse_denominator * s * s * s),
+        6 => return (two * x * y, (two * y).mul_add(y, s)),
+        7 => return ((two * x).mul_add(x, s), two * x * y),
+        12 => return (s, zero),
+        13 => return (s * s, zero),
+        14 => return (zero, s),
+        _ => return (zero, s * s),
     };
-    let mut weight = 1.0;
-    if COUNT >= 12 {
-        let (n, d) = fraction(p);
-        weight = 1.0 / region::value(&d, s);
-        let radial = region::value(&n, s) * weight;
-        let mut power = -radial * weight;
-        for column in 9..12 {
-            power *= s;
-            set(column, x * power, y * power);
-        }
-    }
-    let (first, second, third) = (weight * s, weight * s * s, weight * s * s * s);
-    set(4, x * first, y * first);
-    set(5, x * second, y * second);
-    set(6, 2.0 * x * y, s + 2.0 * y * y);
-    set(7, s + 2.0 * x * x, 2.0 * x * y);
-    if COUNT >= 9 {
-        set(8, x * third, y * third);
-    }
-    if COUNT >= 16 {
-        set(12, s, 0.0);
-        set(13, s * s, 0.0);
-        set(14, 0.0, s);
-        set(15, 0.0, s * s);
-    }
+    (x * radial, y * radial)
 }
 
 /// Squared radius of a disc on which the lens is one-to-one.
@@ -131,7 +145,7 @@ fn radial_factors(n: &[f64; 4], d: &[f64; 4], s: f64) -> (f64, f64) {
 }
 
 /// The point before the lens if it were purely radial: the start for Newton's method.
-pub(super) fn straighten_radially(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> (f64, f64) {
+pub(super) fn undistort_radially(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> (f64, f64) {
     let target = u.hypot(v);
     if target == 0.0 {
         return (0.0, 0.0);

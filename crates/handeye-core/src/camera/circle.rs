@@ -2,7 +2,7 @@
 //!
 //! The perspective image of a circle is an ellipse, found in closed form from its dual conic (Hartley and
 //! Zisserman, "Multiple View Geometry", 2nd ed., 2004, section 8.4). Its centre is its centroid, which is all a
-//! pinhole camera needs. Any other lens bends the ellipse; the centroid then follows from Green's theorem, with the
+//! pinhole camera needs. Any other lens distorts the ellipse; the centroid then follows from Green's theorem, with the
 //! boundary known at a few points and differentiated by trigonometric interpolation: an error that falls
 //! geometrically with the number of points.
 
@@ -141,7 +141,7 @@ impl Ellipse {
     }
 }
 
-/// Points on the boundary of a bent ellipse, anticlockwise at equal steps of the ellipse's parameter.
+/// Points on the boundary of a distorted ellipse, anticlockwise at equal steps of the ellipse's parameter.
 #[derive(Default)]
 pub(super) struct Boundary {
     pub x: [f64; BOUNDARY],

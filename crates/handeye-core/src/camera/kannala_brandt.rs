@@ -4,19 +4,16 @@
 //! lenses", PAMI 28(8), 2006, eq. 6. With `r = sqrt(x^2 + y^2)` and `theta = atan r`:
 //! `(x', y') = (x, y) theta_d / r`, `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`.
 
-use nalgebra::Matrix2;
-
+use super::distortion::DistortedPoint;
+use super::lens::{ParameterJacobian, Parameters};
 use super::region::{self, MAX_SQUARED_RADIUS};
-use super::{Bent, MAX_PARAMETERS, ParameterJacobian};
-
-type Parameters = [f64; MAX_PARAMETERS];
 
 /// Below this squared radius the quotients in `r` are replaced by their series.
 const SMALL: f64 = 1e-8;
 
 /// `theta_d` and its derivative in `theta`.
 #[inline]
-fn bent_angle(p: &Parameters, theta: f64) -> (f64, f64) {
+fn distorted_angle(p: &Parameters, theta: f64) -> (f64, f64) {
     let s = theta * theta;
     let (k1, k2, k3, k4) = (p[4], p[5], p[6], p[7]);
     (
@@ -26,22 +23,28 @@ fn bent_angle(p: &Parameters, theta: f64) -> (f64, f64) {
 }
 
 #[inline]
-pub(super) fn bend(p: &Parameters, x: f64, y: f64) -> Bent {
+pub(super) fn distort(p: &Parameters, x: f64, y: f64) -> DistortedPoint<f64> {
     let s = x * x + y * y;
     let (scale, slope) = if s < SMALL {
         let second = p[4] - 1.0 / 3.0;
         (1.0 + second * s, 2.0 * second)
     } else {
         let r = s.sqrt();
-        let (angle, rate) = bent_angle(p, r.atan());
+        let (angle, rate) = distorted_angle(p, r.atan());
         let scale = angle / r;
         (scale, (rate / (1.0 + s) - scale) / s)
     };
     let cross = slope * x * y;
-    Bent {
+    DistortedPoint {
         x: x * scale,
         y: y * scale,
-        jacobian: Matrix2::new(scale + slope * x * x, cross, cross, scale + slope * y * y),
+        along_x: scale + slope * x * x,
+        cross_x: cross,
+        cross_y: cross,
+        along_y: scale + slope * y * y,
+        squared_radius: s,
+        radial: scale,
+        inverse_denominator: 1.0,
     }
 }
 
@@ -67,15 +70,15 @@ pub(super) fn max_squared_radius(p: &Parameters) -> f64 {
 }
 
 /// The point before the lens; None beyond the largest angle.
-pub(super) fn straighten(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> Option<(f64, f64)> {
+pub(super) fn undistort(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> Option<(f64, f64)> {
     let target = u.hypot(v);
     let limit = max_squared_radius.sqrt().atan();
-    if target > bent_angle(p, limit).0 {
+    if target > distorted_angle(p, limit).0 {
         return None;
     }
     if target == 0.0 {
         return Some((0.0, 0.0));
     }
-    let radius = region::rising_root(target, limit, |theta| bent_angle(p, theta)).tan();
+    let radius = region::rising_root(target, limit, |theta| distorted_angle(p, theta)).tan();
     Some((u * radius / target, v * radius / target))
 }

@@ -6,92 +6,29 @@
 
 mod brown_conrady;
 mod circle;
+mod distortion;
 mod feature;
 mod kannala_brandt;
-mod pinhole;
+mod lens;
+mod observation;
 mod region;
 
-use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Vector2, Vector3};
 
 use crate::error::Error;
+use crate::simd::Scalar;
 
-pub use feature::{Feature, Observation};
-
-/// Most parameters a lens can have (Brown-Conrady with 12 coefficients).
-pub const MAX_PARAMETERS: usize = 16;
+pub(crate) use brown_conrady::{coefficient_derivative, distort};
+pub(crate) use distortion::DistortedPoint;
+pub use feature::Feature;
+pub use lens::{Lens, MAX_PARAMETERS, ParameterJacobian};
+pub use observation::Observation;
 
 /// Points nearer to the camera's plane than this, in metres, count as behind it.
 pub const MIN_DEPTH_M: f64 = 1e-6;
 
 /// Largest magnitude of a parameter: far beyond any lens, small enough that no product overflows.
 const MAX_MAGNITUDE: f64 = 1e12;
-
-/// Derivative of a pixel in the camera parameters; columns beyond the lens' count are zero.
-pub type ParameterJacobian = SMatrix<f64, 2, MAX_PARAMETERS>;
-
-/// The lens models, parameters in OpenCV's order after `fx, fy, cx, cy`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lens {
-    /// No distortion: 4 parameters.
-    Pinhole,
-    /// Radial-tangential `k1 k2 p1 p2`: 8 parameters.
-    BrownConrady4,
-    /// `k1 k2 p1 p2 k3`: 9 parameters.
-    BrownConrady5,
-    /// Rational, `k1 k2 p1 p2 k3 k4 k5 k6`: 12 parameters.
-    BrownConrady8,
-    /// Rational with thin prism, `... s1 s2 s3 s4`: 16 parameters.
-    BrownConrady12,
-    /// Equidistant fisheye `k1 k2 k3 k4`: 8 parameters (Kannala-Brandt 2006).
-    KannalaBrandt,
-}
-
-impl Lens {
-    /// All lenses.
-    pub const ALL: [Self; 6] = [
-        Self::Pinhole,
-        Self::BrownConrady4,
-        Self::BrownConrady5,
-        Self::BrownConrady8,
-        Self::BrownConrady12,
-        Self::KannalaBrandt,
-    ];
-
-    /// Number of parameters, focal lengths and principal point included.
-    #[inline]
-    pub const fn parameter_count(self) -> usize {
-        match self {
-            Self::Pinhole => 4,
-            Self::BrownConrady4 | Self::KannalaBrandt => 8,
-            Self::BrownConrady5 => 9,
-            Self::BrownConrady8 => 12,
-            Self::BrownConrady12 => 16,
-        }
-    }
-
-    /// The name in files and messages.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Pinhole => "pinhole",
-            Self::BrownConrady4 => "brown_conrady_4",
-            Self::BrownConrady5 => "brown_conrady_5",
-            Self::BrownConrady8 => "brown_conrady_8",
-            Self::BrownConrady12 => "brown_conrady_12",
-            Self::KannalaBrandt => "kannala_brandt",
-        }
-    }
-
-    /// The lens of a name.
-    ///
-    /// # Errors
-    /// [`Error::InvalidInput`] that lists the names there are.
-    pub fn from_name(name: &str) -> Result<Self, Error> {
-        Self::ALL.into_iter().find(|lens| lens.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            Error::invalid(format!("unknown lens \"{name}\"; the lenses are {names}"))
-        })
-    }
-}
 
 /// A pixel with its derivatives.
 #[derive(Clone, Copy, Debug)]
@@ -104,19 +41,10 @@ pub struct Projection {
     pub d_parameters: ParameterJacobian,
 }
 
-/// A point of the plane at unit depth after the lens, with its derivative in the point before the lens.
-#[derive(Clone, Copy, Debug)]
-struct Bent {
-    x: f64,
-    y: f64,
-    /// `[[dx/dx0, dx/dy0], [dy/dx0, dy/dy0]]`.
-    jacobian: Matrix2<f64>,
-}
-
 /// A camera: a lens and its parameters `fx, fy, cx, cy, distortion...`, validated.
 ///
 /// The fields are for reading; make a changed camera with [`Camera::new`] or [`Camera::plus`], which also find
-/// out anew where the lens is valid.
+/// out again where the lens is valid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Which lens.
@@ -183,20 +111,20 @@ impl Camera {
 
     /// The point at unit depth after the lens; None outside the region where the lens is one-to-one.
     #[inline]
-    fn bend(&self, x: f64, y: f64) -> Option<Bent> {
+    fn distort(&self, x: f64, y: f64) -> Option<DistortedPoint<f64>> {
         let p = &self.parameters;
         // Written so that NaN falls through to None.
         if x * x + y * y <= self.max_squared_radius {
-            let bent = match self.lens {
-                Lens::Pinhole => return Some(pinhole::bend(x, y)),
-                Lens::BrownConrady4 | Lens::BrownConrady5 => brown_conrady::bend::<false, false>(p, x, y),
-                Lens::BrownConrady8 => brown_conrady::bend::<true, false>(p, x, y),
-                Lens::BrownConrady12 => brown_conrady::bend::<true, true>(p, x, y),
-                Lens::KannalaBrandt => kannala_brandt::bend(p, x, y),
+            let distorted = match self.lens {
+                Lens::Pinhole => return Some(DistortedPoint::unchanged(Scalar, x, y)),
+                Lens::BrownConrady4 | Lens::BrownConrady5 => distort::<_, false, false>(Scalar, p, x, y),
+                Lens::BrownConrady8 => distort::<_, true, false>(Scalar, p, x, y),
+                Lens::BrownConrady12 => distort::<_, true, true>(Scalar, p, x, y),
+                Lens::KannalaBrandt => kannala_brandt::distort(p, x, y),
             };
             // On the very edge rounding can make it singular, next to a pole NaN.
-            if bent.jacobian.determinant() > 0.0 {
-                return Some(bent);
+            if distorted.determinant() > 0.0 {
+                return Some(distorted);
             }
         }
         None
@@ -204,15 +132,17 @@ impl Camera {
 
     /// Derivative of the point after the lens in the distortion coefficients, parameters 4 and on.
     #[inline]
-    fn bend_coefficients(&self, x: f64, y: f64, out: &mut ParameterJacobian) {
-        let p = &self.parameters;
-        match self.lens {
-            Lens::Pinhole => {}
-            Lens::BrownConrady4 => brown_conrady::coefficients::<8>(p, x, y, out),
-            Lens::BrownConrady5 => brown_conrady::coefficients::<9>(p, x, y, out),
-            Lens::BrownConrady8 => brown_conrady::coefficients::<12>(p, x, y, out),
-            Lens::BrownConrady12 => brown_conrady::coefficients::<16>(p, x, y, out),
-            Lens::KannalaBrandt => kannala_brandt::coefficients(x, y, out),
+    fn distortion_derivatives(
+        &self,
+        (x, y): (f64, f64),
+        distorted: &DistortedPoint<f64>,
+        out: &mut ParameterJacobian,
+    ) {
+        if self.lens == Lens::KannalaBrandt {
+            return kannala_brandt::coefficients(x, y, out);
+        }
+        for i in 4..self.lens.parameter_count() {
+            (out[(0, i)], out[(1, i)]) = coefficient_derivative(Scalar, i, x, y, distorted);
         }
     }
 
@@ -241,8 +171,8 @@ impl Camera {
     #[inline]
     pub fn project(&self, point: &Vector3<f64>) -> Option<Vector2<f64>> {
         let (x, y, _) = at_unit_depth(point)?;
-        let bent = self.bend(x, y)?;
-        Some(self.scale_and_shift(bent.x, bent.y))
+        let distorted = self.distort(x, y)?;
+        Some(self.scale_and_shift(distorted.x, distorted.y))
     }
 
     /// Pixel and its derivative in the point.
@@ -252,10 +182,10 @@ impl Camera {
         point: &Vector3<f64>,
     ) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let (x, y, inverse_depth) = at_unit_depth(point)?;
-        let bent = self.bend(x, y)?;
+        let distorted = self.distort(x, y)?;
         Some((
-            self.scale_and_shift(bent.x, bent.y),
-            self.point_derivative(x, y, inverse_depth, &bent.jacobian),
+            self.scale_and_shift(distorted.x, distorted.y),
+            self.point_derivative(x, y, inverse_depth, &distorted),
         ))
     }
 
@@ -263,22 +193,28 @@ impl Camera {
     #[inline]
     pub fn project_with_derivatives(&self, point: &Vector3<f64>) -> Option<Projection> {
         let (x, y, inverse_depth) = at_unit_depth(point)?;
-        let bent = self.bend(x, y)?;
+        let distorted = self.distort(x, y)?;
         let mut d_parameters = ParameterJacobian::zeros();
-        self.bend_coefficients(x, y, &mut d_parameters);
-        self.finish_parameters(bent.x, bent.y, &mut d_parameters);
+        self.distortion_derivatives((x, y), &distorted, &mut d_parameters);
+        self.finish_parameters(distorted.x, distorted.y, &mut d_parameters);
         Some(Projection {
-            pixel: self.scale_and_shift(bent.x, bent.y),
-            d_point: self.point_derivative(x, y, inverse_depth, &bent.jacobian),
+            pixel: self.scale_and_shift(distorted.x, distorted.y),
+            d_point: self.point_derivative(x, y, inverse_depth, &distorted),
             d_parameters,
         })
     }
 
     #[inline]
-    fn point_derivative(&self, x: f64, y: f64, inverse_depth: f64, lens: &Matrix2<f64>) -> Matrix2x3<f64> {
+    fn point_derivative(
+        &self,
+        x: f64,
+        y: f64,
+        inverse_depth: f64,
+        lens: &DistortedPoint<f64>,
+    ) -> Matrix2x3<f64> {
         let fx = self.parameters[0] * inverse_depth;
         let fy = self.parameters[1] * inverse_depth;
-        let (a, b, c, d) = (fx * lens.m11, fx * lens.m12, fy * lens.m21, fy * lens.m22);
+        let (a, b, c, d) = (fx * lens.along_x, fx * lens.cross_x, fy * lens.cross_y, fy * lens.along_y);
         Matrix2x3::new(a, b, -(a * x + b * y), c, d, -(c * x + d * y))
     }
 
@@ -291,10 +227,10 @@ impl Camera {
         }
         let (x, y) = match self.lens {
             Lens::Pinhole => (u, v),
-            Lens::KannalaBrandt => kannala_brandt::straighten(p, self.max_squared_radius, u, v)?,
+            Lens::KannalaBrandt => kannala_brandt::undistort(p, self.max_squared_radius, u, v)?,
             _ => {
-                let start = brown_conrady::straighten_radially(p, self.max_squared_radius, u, v);
-                region::straighten(start, (u, v), |x, y| self.bend(x, y))?
+                let start = brown_conrady::undistort_radially(p, self.max_squared_radius, u, v);
+                region::undistort(start, (u, v), |x, y| self.distort(x, y))?
             }
         };
         let norm_squared = x * x + y * y;

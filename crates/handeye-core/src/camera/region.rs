@@ -5,7 +5,7 @@
 
 use nalgebra::Vector2;
 
-use super::Bent;
+use super::distortion::DistortedPoint;
 
 /// Largest squared radius at unit depth: 89.94 deg off the axis.
 pub(super) const MAX_SQUARED_RADIUS: f64 = 1e6;
@@ -121,10 +121,10 @@ fn rising_between(target: f64, lower: f64, upper: f64, function: impl Fn(f64) ->
 /// Solves `lens(x, y) = target` from a start near the answer, staying where the lens is valid.
 ///
 /// Where that fails (strong decentring next to a fold) the answer is followed from the axis outwards instead.
-pub(super) fn straighten(
+pub(super) fn undistort(
     start: (f64, f64),
     target: (f64, f64),
-    lens: impl Fn(f64, f64) -> Option<Bent>,
+    lens: impl Fn(f64, f64) -> Option<DistortedPoint<f64>>,
 ) -> Option<(f64, f64)> {
     const STAGES: usize = 32;
     let target = Vector2::new(target.0, target.1);
@@ -143,9 +143,9 @@ pub(super) fn straighten(
 fn newton(
     start: Vector2<f64>,
     target: &Vector2<f64>,
-    lens: impl Fn(f64, f64) -> Option<Bent>,
+    lens: impl Fn(f64, f64) -> Option<DistortedPoint<f64>>,
 ) -> Option<Vector2<f64>> {
-    let miss = |at: &Vector2<f64>| lens(at.x, at.y).map(|b| (Vector2::new(b.x, b.y) - target, b.jacobian));
+    let miss = |at: &Vector2<f64>| lens(at.x, at.y).map(|b| (Vector2::new(b.x, b.y) - target, b.jacobian()));
     let mut at = start;
     let (mut residual, mut jacobian) = miss(&at).or_else(|| {
         // The start may lie on the very edge of the region.

@@ -69,13 +69,13 @@ proptest! {
     fn no_two_rays_share_a_pixel(
         lens in lens(),
         k in prop::array::uniform12(-1.0..1.0_f64),
-        bend in 0.0..0.1_f64,
+        strength in 0.0..0.1_f64,
         part in 0.0..1.0_f64,
         angle in 0.0..std::f64::consts::TAU,
     ) {
         let mut parameters = vec![1000.0, 1000.0, 500.0, 500.0];
         // Radial terms of any size, decentring and prism larger than real lenses have them.
-        let size = |i: usize| if matches!(i, 2 | 3 | 8..=11) && lens != Lens::KannalaBrandt { bend } else { 1.0 };
+        let size = |i: usize| if matches!(i, 2 | 3 | 8..=11) && lens != Lens::KannalaBrandt { strength } else { 1.0 };
         parameters.extend((0..lens.parameter_count() - 4).map(|i| k[i] * size(i)));
         let camera = Camera::new(lens, &parameters).expect("finite");
         let radius = camera.max_squared_radius.min(9.0).sqrt() * part;

@@ -18,7 +18,7 @@ pub(super) const PAPER: &str = "N. Andreff, R. Horaud and B. Espiau, \"On-line h
 /// What the translations say about the rotation is used, which makes this more accurate than rotation first
 /// where motions are small; the price is that the answer depends on the unit of length (here metres, as for
 /// others) and that the scale of `R_Z` comes from the hand's translations alone. The translation is solved
-/// for anew (the last rows of eq. 10) once the rotation is orthogonal: that of the linear system belongs to
+/// for again (the last rows of eq. 10) once the rotation is orthogonal: that of the linear system belongs to
 /// the matrix before, and is worse.
 pub(super) fn solve(motions: &[Motion]) -> Result<Se3, Error> {
     let mut matrix = DMatrix::zeros(12 * motions.len(), 12);

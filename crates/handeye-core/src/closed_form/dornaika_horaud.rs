@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use super::Estimate;
+use super::estimate::Estimate;
 use super::linear::null_vector;
 use super::motion::consistent_signs;
 use super::quaternion::{left, right, to_rotation};

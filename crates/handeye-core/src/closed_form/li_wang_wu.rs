@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
 
-use super::Estimate;
+use super::estimate::Estimate;
 use super::linear::least_squares;
 use super::rotation_fit::rotation_of_unit_scale;
 use super::translation::robot_world_translations;
@@ -17,7 +17,7 @@ pub(super) const PAPER: &str = "A. Li, L. Wang and D. Wu, \"Simultaneous robot-w
 ///
 /// Eq. 19: twelve rows per view for `vec(R_W)`, `vec(R_X)` (by rows), `t_W` and `t_X`; the two rotations are
 /// then made orthogonal. Their scale comes from the translations alone, so views that only turn about the
-/// camera's centre are refused. The translations are solved for anew once the rotations are orthogonal: those
+/// camera's centre are refused. The translations are solved for again once the rotations are orthogonal: those
 /// of the linear system belong to the matrices before, and are worse.
 pub(super) fn solve(a: &[Se3], c: &[Se3]) -> Result<Estimate, Error> {
     let mut matrix = DMatrix::zeros(12 * a.len(), 24);

@@ -19,6 +19,7 @@ pub mod automatic;
 mod daniilidis;
 pub mod degeneracy;
 mod dornaika_horaud;
+mod estimate;
 mod horaud_dornaika;
 mod li_wang_wu;
 mod linear;
@@ -37,20 +38,12 @@ mod zhuang_roth_sudhakar;
 use crate::error::Error;
 use crate::se3::Se3;
 use degeneracy::AxisSpread;
+pub use estimate::Estimate;
 use motion::Motion;
 pub use motion::{HALF_TURN_MARGIN_RAD, MAX_PAIRS};
 
 /// Fewest views: two relative motions with different axes need three.
 pub const MIN_VIEWS: usize = 3;
-
-/// What a method returns: `C[k] ~ x A[k] y`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// `X`: `T_camera_flange` (eye-in-hand) or `T_camera_base` (eye-to-hand).
-    pub x: Se3,
-    /// `Y`: `T_base_target` (eye-in-hand) or `T_flange_target` (eye-to-hand).
-    pub y: Se3,
-}
 
 /// Which equation a method solves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

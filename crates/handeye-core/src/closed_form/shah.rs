@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3, SMatrix};
 
-use super::Estimate;
+use super::estimate::Estimate;
 use super::linear::null_vector;
 use super::rotation_fit::rotation_of_either_sign;
 use super::translation::robot_world_translations;

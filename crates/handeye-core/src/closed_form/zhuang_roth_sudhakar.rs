@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector4};
 
-use super::Estimate;
 use super::dornaika_horaud::NO_SIGNS;
+use super::estimate::Estimate;
 use super::linear::{least_squares, singular_of_stack};
 use super::motion::consistent_signs;
 use super::quaternion::{conjugate, half_turns, multiply, to_rotation, vector_part};

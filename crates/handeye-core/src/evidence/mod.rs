@@ -5,22 +5,23 @@
 //! noise level costs microseconds, so a whole grid of levels and sides is weighed and the answer is averaged
 //! over it. Pixels are read once.
 
-mod chain;
-mod compressed;
-mod descent;
+
+
+
 mod hypotheses;
 mod joints;
 mod links;
 mod posterior;
 mod smooth;
+
+
 mod systems;
-mod twists;
 mod view_sets;
 mod weigh;
 mod weigh_links;
 
-pub use chain::{ChainStart, WeakPrior, start_from_poses};
-pub use compressed::{CompressedView, compress, shrunk_variances};
+pub use crate::estimation::{ChainStart, PoseMeasurement as CompressedView, WeakPrior, compress, shrunk_variances, start_from_poses};
+
 pub use hypotheses::{EXACT_OFFSET_RAD, Hypothesis, JointPrior, LevelPrior, LogNormal, Nature, SMOOTH_ODDS};
 pub use joints::JointErrors;
 pub use links::LinkErrors;

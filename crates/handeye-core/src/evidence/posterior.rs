@@ -7,8 +7,8 @@
 
 use nalgebra::{DMatrix, DVector, Vector6};
 
-use super::chain::WeakPrior;
-use super::compressed::CompressedView;
+use crate::estimation::WeakPrior;
+use crate::estimation::PoseMeasurement as CompressedView;
 use super::hypotheses::{Hypothesis, Nature};
 use super::joints::JointErrors;
 use super::links::LinkErrors;

@@ -3,11 +3,24 @@
 use nalgebra::{DMatrix, Vector6};
 
 use super::*;
+use crate::least_squares::Side;
 use crate::least_squares::tests::Cell;
-use crate::least_squares::{RobotNoise, Side};
 use crate::planar_pose::planar_pose;
 use crate::se3::Se3;
 use crate::testing::Random;
+
+/// Error of the robot's poses with the same deviations on every axis.
+struct RobotNoise {
+    side: Side,
+    translation_m: f64,
+    rotation_rad: f64,
+}
+
+impl RobotNoise {
+    fn isotropic(side: Side, translation_m: f64, rotation_rad: f64) -> Self {
+        Self { side, translation_m, rotation_rad }
+    }
+}
 
 fn compressed(cell: &Cell, reported: &[Se3], sigma_px: f64, seed: u64) -> Vec<CompressedView> {
     let problem = cell.problem_with(reported, sigma_px, seed);
@@ -54,8 +67,8 @@ fn noisy(cell: &Cell, noise: Option<&RobotNoise>, seed: u64) -> Vec<Se3> {
         .iter()
         .map(|a| {
             let Some(noise) = noise else { return *a };
-            let white = Vector6::from_fn(|_, _| random.normal());
-            let error = Se3::exp(&(noise.square_root(0) * white));
+            let sigma = |i| if i < 3 { noise.translation_m } else { noise.rotation_rad };
+            let error = Se3::exp(&Vector6::from_fn(|i, _| sigma(i) * random.normal()));
             if noise.side == Side::Left { error * *a } else { *a * error }
         })
         .collect()

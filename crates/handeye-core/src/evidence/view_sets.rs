@@ -10,8 +10,8 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::systems::{eliminate, entries_of, invert_column, substitute};
+use crate::batched_algebra::{UPPER, load, triangle, upper};
 use crate::error::Error;
-use crate::lanes::{UPPER, load, triangle, upper};
 use crate::least_squares::Side;
 use crate::positive::Factor;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch, ln};

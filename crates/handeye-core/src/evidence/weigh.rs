@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, Matrix6};
 
 use super::hypotheses::Hypothesis;
 use super::smooth::SmoothError;
-use crate::lanes::{UPPER, factorise, log_pivots, triangle, upper};
+use crate::batched_algebra::{UPPER, factorise, log_pivots, triangle, upper};
 use crate::least_squares::Side;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
 

@@ -3,17 +3,15 @@
 use nalgebra::{DMatrix, Matrix4, Matrix6, Vector2};
 
 use super::belief::{Belief, CHAIN};
-use super::criteria::Criterion;
-use super::scorer::Scorer;
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
-use crate::least_squares::{Model, Moments, PixelColumns, PixelParameters, Side, ViewBlock, marginalised};
+use crate::least_squares::{Moments, PixelColumns, PixelParameters, Side, ViewBlock, marginalised};
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
 
 /// Which features a candidate is expected to see.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sight {
+pub struct Visibility {
     /// Image width and height, px; `None`: whatever the lens can project counts.
     pub image: Option<[f64; 2]>,
     /// Distance that a feature must keep from the image border, px.
@@ -42,7 +40,7 @@ pub struct CandidateModel<'a> {
     /// Number of kinematic parameters (their Jacobian comes with each candidate).
     pub kinematic_count: usize,
     /// What must be seen.
-    pub sight: Sight,
+    pub visibility: Visibility,
 }
 
 /// What may be so of the robot's error, and what is believed then.
@@ -116,11 +114,11 @@ impl CandidateModel<'_> {
     fn block(&self, motion: &Se3, joints: Option<&CandidateJoints>) -> Option<(ViewBlock, usize)> {
         let mut sums = self.sums();
         let seen = self.sum(&(self.x * *motion * self.y), &mut sums);
-        if seen < self.sight.fewest.max(1) {
+        if seen < self.visibility.fewest.max(1) {
             return None;
         }
         let (m, g) = sums.moments.finish();
-        let block = ViewBlock { m, g, columns: sums.columns, cost: 0.0, squared_px: 0.0 };
+        let block = ViewBlock { m, g, columns: sums.columns, squared_px: 0.0 };
         let of_joints = joints.and_then(|j| j.noise_root).map(|root| (Side::Left, root));
         let Some((side, root)) = &of_joints.or(self.robot) else { return Some((block, seen)) };
         let before = match side {
@@ -150,8 +148,8 @@ impl CandidateModel<'_> {
                 if !self.in_image(&o.pixel) {
                     continue;
                 }
-                sums.moments.add(&o.d_twist, None, &nothing, weight);
-                columns.add(parameters, &o, &(pose.rotation * feature.position), &nothing, weight, None);
+                sums.moments.add(&o.d_twist, &nothing, weight);
+                columns.add(parameters, &o, &(pose.rotation * feature.position), &nothing, weight);
             } else {
                 let Some((pixel, d)) = self.camera.observe_with_twist_derivative(pose, feature) else {
                     continue;
@@ -159,7 +157,7 @@ impl CandidateModel<'_> {
                 if !self.in_image(&pixel) {
                     continue;
                 }
-                sums.moments.add(&d, None, &nothing, weight);
+                sums.moments.add(&d, &nothing, weight);
             }
             seen += 1;
         }
@@ -168,8 +166,8 @@ impl CandidateModel<'_> {
 
     #[inline]
     fn in_image(&self, pixel: &Vector2<f64>) -> bool {
-        let margin = self.sight.margin_px;
-        match self.sight.image {
+        let margin = self.visibility.margin_px;
+        match self.visibility.image {
             None => true,
             Some([width, height]) => {
                 pixel.x >= margin
@@ -195,107 +193,6 @@ impl CandidateModel<'_> {
         }
         let factor = map.tr_mul(&semidefinite_root(block.matrix()));
         Some(Candidate { factor, seen })
-    }
-
-    /// Gains of candidates at the motions; NaN where too little would be in sight.
-    ///
-    /// # Errors
-    /// [`Error::InvalidInput`] if the belief has other parameters than this model.
-    pub fn gains(
-        &self,
-        belief: &Belief,
-        criterion: &dyn Criterion,
-        motions: &[Se3],
-    ) -> Result<Vec<f64>, Error> {
-        self.gains_by(belief, criterion, Motions::Transforms(motions), &Execution::default())
-    }
-
-    /// As [`CandidateModel::gains`], of motions in either form and with a say in how the machine is used.
-    ///
-    /// # Errors
-    /// As [`CandidateModel::gains`], and [`Error::NotRigid`] if a matrix is no rigid transform.
-    pub fn gains_by(
-        &self,
-        belief: &Belief,
-        criterion: &dyn Criterion,
-        motions: Motions<'_>,
-        execution: &Execution,
-    ) -> Result<Vec<f64>, Error> {
-        let supposed = Supposition { weight: 1.0, belief, robot: self.robot };
-        self.mean_gains(&[supposed], criterion, motions, execution)
-    }
-
-    /// As [`CandidateModel::gains_by`], averaged over what may be supposed of the robot in place of the model's; the
-    /// points of a candidate are looked at once.
-    ///
-    /// # Errors
-    /// As [`CandidateModel::gains_by`].
-    pub fn mean_gains(
-        &self,
-        supposed: &[Supposition<'_>],
-        criterion: &dyn Criterion,
-        motions: Motions<'_>,
-        execution: &Execution,
-    ) -> Result<Vec<f64>, Error> {
-        let mut gains = vec![0.0; motions.len()];
-        if let Some(quantity) = criterion.quantity() {
-            let mut scorer = Scorer::new(self, execution.unit);
-            for one in supposed {
-                self.check(one.belief)?;
-                let prepared = criterion.prepare(one.belief)?;
-                scorer.add_goal(one.weight, one.belief, one.robot.as_ref(), &quantity, prepared)?;
-            }
-            scorer.score(motions, execution, &mut gains)?;
-            return Ok(gains);
-        }
-        for one in supposed {
-            self.check(one.belief)?;
-            let model = Self { robot: one.robot, ..self.clone() };
-            let prepared = criterion.prepare(one.belief)?;
-            for (i, gain) in gains.iter_mut().enumerate() {
-                let candidate = model.candidate(&motions.get(i)?, None);
-                *gain += one.weight * candidate.map_or(f64::NAN, |c| prepared.gain(&c.factor));
-            }
-        }
-        Ok(gains)
-    }
-
-    /// As [`CandidateModel::gains`], of an arm whose joints err: one [`CandidateJoints`] per motion.
-    ///
-    /// # Errors
-    /// As [`CandidateModel::gains`], and if there are not as many or not with as many offsets.
-    pub fn gains_with_joints(
-        &self,
-        belief: &Belief,
-        criterion: &dyn Criterion,
-        motions: &[Se3],
-        joints: &[CandidateJoints],
-    ) -> Result<Vec<f64>, Error> {
-        self.check(belief)?;
-        if joints.len() != motions.len() || joints.iter().any(|j| j.offsets.ncols() != self.kinematic_count) {
-            return Err(Error::invalid(format!(
-                "expected joints of {} motions with {} free offsets each",
-                motions.len(),
-                self.kinematic_count
-            )));
-        }
-        let prepared = criterion.prepare(belief)?;
-        let gain = |(motion, joints)| {
-            self.candidate(motion, Some(joints))
-                .map_or(f64::NAN, |candidate| prepared.gain(&candidate.factor))
-        };
-        Ok(motions.iter().zip(joints).map(gain).collect())
-    }
-
-    fn check(&self, belief: &Belief) -> Result<(), Error> {
-        if belief.len() == self.parameter_count() {
-            return Ok(());
-        }
-        Err(Error::invalid(format!(
-            "the belief has {} parameters, the candidates {}",
-            belief.len(),
-            self.parameter_count()
-        )))
     }
 }
 
@@ -381,15 +278,6 @@ impl Execution {
             0 => std::thread::available_parallelism().map_or(1, usize::from).min(most),
             threads => threads.min(candidates.max(1)),
         }
-    }
-}
-
-/// What a solve's model says of candidates.
-impl Model {
-    /// Mean pixel noise of the views (root mean square).
-    pub fn mean_pixel_sigma(&self) -> f64 {
-        let sum: f64 = self.pixel_sigma.iter().map(|s| s * s).sum();
-        (sum / self.pixel_sigma.len() as f64).sqrt()
     }
 }
 

@@ -6,8 +6,11 @@
 mod belief;
 mod candidate;
 pub mod criteria;
+mod gains;
 mod scorer;
 
 pub use belief::{Belief, entropy};
 pub(crate) use candidate::semidefinite_root;
-pub use candidate::{Candidate, CandidateJoints, CandidateModel, Execution, Motions, Sight, Supposition};
+pub use candidate::{
+    Candidate, CandidateJoints, CandidateModel, Execution, Motions, Supposition, Visibility,
+};

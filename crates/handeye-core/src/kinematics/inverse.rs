@@ -261,7 +261,7 @@ fn range(kind: JointKind, lower: f64, upper: f64) -> (f64, f64) {
 }
 
 impl Unreached {
-    /// As an error for whoever needs one.
+    /// As an error.
     pub fn into_error(self) -> Error {
         Error::numerical(format!(
             "the arm does not reach the pose within its joint limits: nearest {:.1} mm and {:.2} deg away",

@@ -1,12 +1,9 @@
 //! One view as a six-dimensional measurement: its 6 x 6 information and gradient in the camera-frame twist,
 //! and beside it the columns of the pixel parameters.
 
-use nalgebra::{
-    DMatrix, DVector, Matrix2, Matrix2x6, Matrix6, Matrix6xX, SMatrix, Vector2, Vector3, Vector6,
-};
+use nalgebra::{DMatrix, DVector, Matrix2x6, Matrix6, Matrix6xX, SMatrix, Vector2, Vector3, Vector6};
 
-use super::loss::Loss;
-use super::model::PixelParameters;
+use super::pixel_parameters::PixelParameters;
 use super::problem::Problem;
 use crate::camera::{Camera, Observation};
 use crate::se3::Se3;
@@ -14,14 +11,12 @@ use crate::se3::Se3;
 /// The quadratic of one view around `T_camera_target`, in `[eta; c]`: twist and pixel parameters.
 #[derive(Clone, Debug)]
 pub struct ViewBlock {
-    /// `M = G' W G`.
+    /// `M = G' G / sigma^2`.
     pub m: Matrix6<f64>,
-    /// Gradient `G' W r` with `r = pi - u`.
+    /// Gradient `G' r / sigma^2` with `r = pi - u`.
     pub g: Vector6<f64>,
     /// Pixel-parameter columns; `None` without pixel parameters.
     pub columns: Option<PixelColumns>,
-    /// Sum of `rho(|W^1/2 r|^2)`.
-    pub cost: f64,
     /// Sum of squared residuals, px^2.
     pub squared_px: f64,
 }
@@ -29,11 +24,11 @@ pub struct ViewBlock {
 /// Blocks of the pixel parameters in a view's quadratic.
 #[derive(Clone, Debug)]
 pub struct PixelColumns {
-    /// `G' W C`, `6 x n`.
+    /// `G' C / sigma^2`, `6 x n`.
     pub mc: Matrix6xX<f64>,
-    /// `C' W C`, `n x n`.
+    /// `C' C / sigma^2`, `n x n`.
     pub cc: DMatrix<f64>,
-    /// `C' W r`.
+    /// `C' r / sigma^2`.
     pub gc: DVector<f64>,
 }
 
@@ -64,16 +59,9 @@ impl Moments {
         Self { upper: [0.0; 21], gradient: [0.0; 6] }
     }
 
-    /// Adds `d' w d` and `d' w r` of a point; `residual` whitened already.
+    /// Adds `d' w d` and `d' w r` of a point.
     #[inline]
-    pub(crate) fn add(
-        &mut self,
-        d_twist: &Matrix2x6<f64>,
-        whitening: Option<&Matrix2<f64>>,
-        residual: &Vector2<f64>,
-        weight: f64,
-    ) {
-        let d_twist = whitening.map_or(*d_twist, |w| w * d_twist);
+    pub(crate) fn add(&mut self, d_twist: &Matrix2x6<f64>, residual: &Vector2<f64>, weight: f64) {
         for axis in 0..2 {
             let mut n = 0;
             for i in 0..6 {
@@ -105,55 +93,38 @@ impl Moments {
 /// The quadratic of view `k` of `problem` at `pose = T_camera_target`, noise `sigma` px.
 ///
 /// `None` where a point cannot be seen (behind the camera, outside the lens' valid region).
-#[expect(clippy::too_many_arguments, reason = "the parts of a solver's state, all of different types")]
 pub fn view_block(
     problem: &Problem,
     k: usize,
     camera: &Camera,
-    board_scale: f64,
     pose: &Se3,
     sigma: f64,
     pixel_parameters: Option<&PixelParameters>,
-    loss: Loss,
 ) -> Option<ViewBlock> {
     let range = problem.samples(k);
-    let features = &problem.features()[range.clone()];
-    let pixels = &problem.pixels()[range.clone()];
-    let information = 1.0 / (sigma * sigma);
+    let weight = 1.0 / (sigma * sigma);
     let mut moments = Moments::new();
     let mut columns = pixel_parameters.map(|p| (p, PixelColumns::zeros(p.count())));
-    let mut cost = 0.0;
     let mut squared_px = 0.0;
-    for (i, (feature, pixel)) in features.iter().zip(pixels).enumerate() {
-        let feature = feature.scaled(1.0 + board_scale);
-        let whitening = problem.whitening(range.start + i);
-        let whiten = |r: Vector2<f64>| whitening.map_or(r, |w| w * r);
+    for (feature, pixel) in problem.features()[range.clone()].iter().zip(&problem.pixels()[range]) {
+        let residual;
         if let Some((parameters, columns)) = &mut columns {
-            let seen = camera.observe_with_derivatives(pose, &feature)?;
-            let residual = seen.pixel - pixel;
-            squared_px += residual.norm_squared();
-            let residual = whiten(residual);
-            let (rho, slope) = loss.evaluate(residual.norm_squared() * information);
-            cost += rho;
-            let weight = information * slope;
-            moments.add(&seen.d_twist, whitening, &residual, weight);
-            let moved = pose.rotation * feature.position;
-            columns.add(parameters, &seen, &moved, &residual, weight, whitening);
+            let seen = camera.observe_with_derivatives(pose, feature)?;
+            residual = seen.pixel - pixel;
+            moments.add(&seen.d_twist, &residual, weight);
+            columns.add(parameters, &seen, &(pose.rotation * feature.position), &residual, weight);
         } else {
-            let (predicted, d_twist) = camera.observe_with_twist_derivative(pose, &feature)?;
-            let residual = predicted - pixel;
-            squared_px += residual.norm_squared();
-            let residual = whiten(residual);
-            let (rho, slope) = loss.evaluate(residual.norm_squared() * information);
-            cost += rho;
-            moments.add(&d_twist, whitening, &residual, information * slope);
+            let (predicted, d_twist) = camera.observe_with_twist_derivative(pose, feature)?;
+            residual = predicted - pixel;
+            moments.add(&d_twist, &residual, weight);
         }
+        squared_px += residual.norm_squared();
     }
-    if !cost.is_finite() {
+    if !squared_px.is_finite() {
         return None;
     }
     let (m, g) = moments.finish();
-    Some(ViewBlock { m, g, columns: columns.map(|c| c.1), cost, squared_px })
+    Some(ViewBlock { m, g, columns: columns.map(|c| c.1), squared_px })
 }
 
 /// Widest set of pixel parameters: all of a lens' and the board scale.
@@ -165,7 +136,7 @@ impl PixelColumns {
         Self { mc: Matrix6xX::zeros(n), cc: DMatrix::zeros(n, n), gc: DVector::zeros(n) }
     }
 
-    /// Adds one point; `seen` and `residual` whitened by `whitening`, `weight` the rest of its information.
+    /// Adds one point, `weight` its information.
     pub(crate) fn add(
         &mut self,
         parameters: &PixelParameters,
@@ -173,7 +144,6 @@ impl PixelColumns {
         point: &Vector3<f64>,
         residual: &Vector2<f64>,
         weight: f64,
-        whitening: Option<&Matrix2<f64>>,
     ) {
         let mut extra = SMatrix::<f64, 2, MAX_COLUMNS>::zeros();
         for (column, parameter) in parameters.camera.iter().enumerate() {
@@ -184,11 +154,7 @@ impl PixelColumns {
             let d_point = seen.d_twist.fixed_columns::<3>(0);
             extra.set_column(parameters.camera.len(), &(d_point * point));
         }
-        let mut d_twist = seen.d_twist;
-        if let Some(w) = whitening {
-            extra = w * extra;
-            d_twist = w * d_twist;
-        }
+        let d_twist = &seen.d_twist;
         let n = self.gc.len();
         for j in 0..n {
             let (eu, ev) = (weight * extra[(0, j)], weight * extra[(1, j)]);

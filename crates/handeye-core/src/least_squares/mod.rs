@@ -1,29 +1,33 @@
-//! Maximum likelihood on reprojection error over the chain `X A_k Y`.
+//! Maximum likelihood on reprojection error over the chain `X A_k Y`, robot and camera taken as exact.
 //!
-//! Unknowns: `X` and `Y` (twelve parameters), and as the model says: free camera parameters and the board
-//! scale with a prior, further parameters of the robot's kinematics with a prior, and one pose correction
-//! per view that is marginalised exactly. Twists perturb on the left: `X <- exp(xi_x) X`.
+//! Unknowns are `X` and `Y`, twelve parameters; a prior may say where they are. Twists perturb on the left:
+//! `X <- exp(xi_x) X`. Beside the solver stands what a view says of camera and board, for those who free them.
 
 mod accumulate;
+mod batched;
 mod engine;
-mod general;
-mod loss;
 mod marginal;
+mod measurements;
 mod model;
+mod options;
+mod pixel_parameters;
 mod problem;
 mod report;
-mod side_by_side;
+mod side;
 mod solver;
+mod view_by_view;
 
 pub(crate) use accumulate::Moments;
 pub use accumulate::{PixelColumns, ViewBlock, view_block};
-pub use loss::Loss;
+pub(crate) use batched::through_chain;
 pub(crate) use marginal::marginalised;
-pub use model::{ChainPrior, KinematicParameters, Model, PixelParameters, RobotNoise, Side};
+pub use model::{ChainPrior, Model};
+pub use options::{Options, Start};
+pub use pixel_parameters::PixelParameters;
 pub use problem::{MIN_VIEWS, Problem};
-pub use report::{Ending, Solution, ViewReport};
-pub(crate) use side_by_side::through_chain;
-pub use solver::{Method, Options, Start, solve};
+pub use report::{Ending, Solution};
+pub use side::Side;
+pub use solver::solve;
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Vector2;
 
-use super::side_by_side::Measurements;
+use super::measurements::{Measurements, View};
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
 use crate::se3::Se3;
@@ -18,28 +18,22 @@ pub struct Problem {
     camera: Camera,
     features: Vec<Feature>,
     pixels: Vec<Vector2<f64>>,
-    /// Square roots of the information of each pixel relative to the view's noise; `None`: identity.
-    whitening: Option<Vec<Matrix2<f64>>>,
     offsets: Vec<usize>,
     motions: Vec<Se3>,
-    /// All views in order, as lanes want them; none where there are circles.
+    /// As lanes want them; none for circles and fisheyes.
     measurements: Option<Measurements>,
 }
 
 impl Problem {
     /// Views `k = 0..K` hold the samples `offsets[k]..offsets[k + 1]`; `motions[k]` is `A_k` of the chain.
     ///
-    /// `covariances` are the per-point pixel covariances of the paper's eq. 5, relative to the noise level of
-    /// the view (identity if absent).
-    ///
     /// # Errors
-    /// [`Error::InvalidInput`] if lengths disagree, a pixel is not finite, a view has fewer than three
-    /// samples, or a covariance is not positive definite.
+    /// [`Error::InvalidInput`] if lengths disagree, a pixel is not finite, or a view has fewer than
+    /// three samples.
     pub fn new(
         camera: Camera,
         features: Vec<Feature>,
         pixels: Vec<Vector2<f64>>,
-        covariances: Option<&[Matrix2<f64>]>,
         offsets: Vec<usize>,
         motions: Vec<Se3>,
     ) -> Result<Self, Error> {
@@ -69,14 +63,23 @@ impl Problem {
                 }
             }
         }
-        let whitening = covariances.map(|all| whitening(all, pixels.len())).transpose()?;
-        let mut problem = Self { camera, features, pixels, whitening, offsets, motions, measurements: None };
-        let views: Vec<usize> = (0..problem.view_count()).collect();
-        problem.measurements = Measurements::new(&problem, &views, false);
+        let mut problem = Self { camera, features, pixels, offsets, motions, measurements: None };
+        problem.measurements = Measurements::new(&problem.camera, &problem.views());
         Ok(problem)
     }
 
-    /// All views in order, as lanes want them; None where there are circles.
+    /// All views in order.
+    pub(super) fn views(&self) -> Vec<View<'_>> {
+        (0..self.view_count())
+            .map(|k| View {
+                motion: self.motion(k),
+                features: &self.features[self.samples(k)],
+                pixels: &self.pixels[self.samples(k)],
+            })
+            .collect()
+    }
+
+    /// As lanes want them; None for circles and fisheyes.
     pub(super) fn measurements(&self) -> Option<&Measurements> {
         self.measurements.as_ref()
     }
@@ -115,28 +118,4 @@ impl Problem {
     pub fn pixels(&self) -> &[Vector2<f64>] {
         &self.pixels
     }
-
-    /// Square root of the relative information of sample `i`.
-    pub fn whitening(&self, i: usize) -> Option<&Matrix2<f64>> {
-        self.whitening.as_ref().map(|w| &w[i])
-    }
-}
-
-fn whitening(covariances: &[Matrix2<f64>], samples: usize) -> Result<Vec<Matrix2<f64>>, Error> {
-    if covariances.len() != samples {
-        return Err(Error::invalid(format!("{} point covariances but {samples} points", covariances.len())));
-    }
-    covariances
-        .iter()
-        .enumerate()
-        .map(|(i, covariance)| {
-            let lower = covariance
-                .cholesky()
-                .ok_or_else(|| Error::invalid(format!("covariance of point {i} is not positive definite")))?
-                .l();
-            lower
-                .try_inverse()
-                .ok_or_else(|| Error::invalid(format!("covariance of point {i} is not positive definite")))
-        })
-        .collect()
 }

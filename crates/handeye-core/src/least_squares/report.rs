@@ -1,8 +1,7 @@
 //! How a solve ended and what it found.
 
-use nalgebra::{DMatrix, DVector, Vector6};
+use nalgebra::DMatrix;
 
-use crate::camera::Camera;
 use crate::positive::Factor;
 use crate::se3::Se3;
 
@@ -42,23 +41,6 @@ impl Ending {
     }
 }
 
-/// One view at the solution.
-#[derive(Clone, Debug)]
-pub struct ViewReport {
-    /// Index of the view in the problem.
-    pub view: usize,
-    /// Root mean square over its points of the residual's norm, px.
-    pub rmse_px: f64,
-    /// Sum of its squared whitened residuals (after the loss).
-    pub cost: f64,
-    /// Estimated robot error as a twist on the model's side (zero without robot noise).
-    pub correction: Vector6<f64>,
-    /// Sum of squares of the whitened correction.
-    pub correction_cost: f64,
-    /// `T_camera_target` at the solution.
-    pub pose: Se3,
-}
-
 /// The answer of a solve; meaningful if `ending.is_converged()`.
 #[derive(Clone, Debug)]
 pub struct Solution {
@@ -66,19 +48,11 @@ pub struct Solution {
     pub x: Se3,
     /// `Y` of the chain.
     pub y: Se3,
-    /// The camera with its free parameters updated.
-    pub camera: Camera,
-    /// Board scale minus one (zero if not free).
-    pub board_scale: f64,
-    /// Kinematic parameters (empty if none).
-    pub kinematic: DVector<f64>,
-    /// Information of the global parameters, pose corrections marginalised, priors included.
+    /// Information of `[xi_x; xi_y]`, the prior included.
     pub information: DMatrix<f64>,
     /// Factorisation of `information` where it is positive definite.
     pub(super) factor: Option<Factor>,
-    /// The part of `information` that came from priors.
-    pub prior_information: DMatrix<f64>,
-    /// Minus twice the log posterior up to constants: whitened residuals, corrections and priors.
+    /// Minus twice the log posterior up to constants: whitened residuals and prior.
     pub cost: f64,
     /// Cost at the start.
     pub initial_cost: f64,
@@ -86,14 +60,10 @@ pub struct Solution {
     pub iterations: usize,
     /// Why it stopped.
     pub ending: Ending,
-    /// Views used, in the order given.
-    pub views: Vec<ViewReport>,
-    /// Sum over views of `ln |I + L' M L|`: the determinant that marginal likelihood needs.
-    pub correction_log_determinant: f64,
 }
 
 impl Solution {
-    /// Covariance of the global parameters, the inverse of their information; `None` where that is singular.
+    /// Covariance of `[xi_x; xi_y]`, the inverse of their information; `None` where that is singular.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let inverse = self.factor.as_ref()?.inverse();
         inverse.as_slice().iter().all(|x| x.is_finite()).then_some(inverse)

@@ -1,65 +1,16 @@
-//! Levenberg-Marquardt and Gauss-Newton with the per-view pose corrections eliminated (Schur complement).
+//! Levenberg-Marquardt.
 //!
 //! Damping after Nielsen (1999), "Damping Parameter in Marquardt's Method", IMM-REP-1999-05.
 
+use super::batched::{BatchedEngine, Workspace};
 use super::engine::{Engine, Proposal};
-use super::general::General;
-use super::loss::Loss;
 use super::model::Model;
+use super::options::{Options, Start};
 use super::problem::{MIN_VIEWS, Problem};
 use super::report::{Ending, Solution};
-use super::side_by_side::{Desk, Measurements, SideBySide, fits};
+use super::view_by_view::ViewByView;
 use crate::error::Error;
-use crate::se3::Se3;
 use crate::simd::VectorUnit;
-
-/// Which iteration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// Damped; each accepted step decreases the cost.
-    LevenbergMarquardt,
-    /// Undamped full steps.
-    GaussNewton,
-}
-
-/// How to iterate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
-    /// Which iteration.
-    pub method: Method,
-    /// Most steps, accepted or not.
-    pub max_iterations: usize,
-    /// Stop when an accepted step decreases the cost by less than this fraction.
-    pub cost_tolerance: f64,
-    /// Stop when no parameter moves by more than this (metres, radians).
-    pub step_tolerance: f64,
-    /// Stop when the predicted decrease is below this fraction of the cost (or of the rounding floor).
-    pub gradient_tolerance: f64,
-    /// Robust loss on points.
-    pub loss: Loss,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            method: Method::LevenbergMarquardt,
-            max_iterations: 100,
-            cost_tolerance: 1e-10,
-            step_tolerance: 1e-13,
-            gradient_tolerance: 1e-12,
-            loss: Loss::Squared,
-        }
-    }
-}
-
-/// Where to start.
-#[derive(Clone, Copy, Debug)]
-pub struct Start {
-    /// `X` of the chain.
-    pub x: Se3,
-    /// `Y` of the chain.
-    pub y: Se3,
-}
 
 /// Damping to begin with, and by how much a step that the model foresaw lowers it at most: what is damped beyond need
 /// keeps poorly determined directions from converging as fast as Newton's method would.
@@ -70,48 +21,26 @@ const LARGEST_DAMPING: f64 = 1e16;
 /// Squared whitened residual per sample below which a cost is rounding.
 const ROUNDING_COST: f64 = 1e-20;
 
-/// Minimises the cost of `model` over the given views from `start`.
+/// Minimises the cost of `model` from `start`.
 ///
 /// # Errors
-/// [`Error::InvalidInput`] where model or views do not fit the problem, [`Error::TooFewViews`] below
-/// [`MIN_VIEWS`], [`Error::Numerical`] where the start puts a target out of the camera's sight.
+/// [`Error::InvalidInput`] where the model does not fit the problem, [`Error::TooFewViews`] below [`MIN_VIEWS`],
+/// [`Error::Numerical`] where the start puts a target out of the camera's sight.
 /// A solve that ran but found no answer is an [`Ending`], not an error.
-pub fn solve(
-    problem: &Problem,
-    model: &Model,
-    start: &Start,
-    views: &[usize],
-    options: &Options,
-) -> Result<Solution, Error> {
-    model.check(problem.view_count(), problem.camera())?;
-    if let Some(k) = views.iter().find(|k| **k >= problem.view_count()) {
-        return Err(Error::invalid(format!("view {k} of {}", problem.view_count())));
+pub fn solve(problem: &Problem, model: &Model, start: &Start, options: &Options) -> Result<Solution, Error> {
+    model.check(problem.view_count())?;
+    if problem.view_count() < MIN_VIEWS {
+        return Err(Error::TooFewViews { given: problem.view_count(), needed: MIN_VIEWS });
     }
-    if views.len() < MIN_VIEWS {
-        return Err(Error::TooFewViews { given: views.len(), needed: MIN_VIEWS });
-    }
-    let samples: usize = views.iter().map(|k| problem.point_count(*k)).sum();
+    let samples = problem.pixels().len();
     let hidden = |k| Error::numerical(format!("the start puts points of view {k} out of the camera's sight"));
-    let in_order = views.iter().copied().eq(0..problem.view_count());
-    // An error of the robot is that of a whole view.
-    let whole = model.robot.is_some();
-    let ready = problem.measurements().filter(|m| in_order && (!whole || m.parts == 1));
-    let packed;
-    let measurements = if !fits(problem, model) {
-        None
-    } else if ready.is_some() {
-        ready
-    } else {
-        packed = Measurements::new(problem, views, whole);
-        packed.as_ref()
-    };
-    if let Some(measurements) = measurements {
-        let mut desk = Desk::new(VectorUnit::widest());
-        let mut engine = SideBySide::new(problem, model, options, views, measurements, start, &mut desk)
+    if let Some(measurements) = problem.measurements() {
+        let mut workspace = Workspace::new(VectorUnit::widest());
+        let mut engine = BatchedEngine::new(problem.camera(), model, measurements, start, &mut workspace)
             .map_err(hidden)?;
         return Ok(iterate(&mut engine, options, samples));
     }
-    let mut engine = General::new(problem, model, options.loss, views, start).map_err(hidden)?;
+    let mut engine = ViewByView::new(problem, model, start).map_err(hidden)?;
     Ok(iterate(&mut engine, options, samples))
 }
 
@@ -120,10 +49,8 @@ pub(super) fn iterate(engine: &mut dyn Engine, options: &Options, samples: usize
     let initial_cost = engine.cost();
     let mut cost = initial_cost;
     let floor = ROUNDING_COST * samples as f64;
-    let damped = options.method == Method::LevenbergMarquardt;
-    let mut damping = if damped { FIRST_DAMPING } else { 0.0 };
+    let mut damping = FIRST_DAMPING;
     let mut growth = 2.0;
-    let mut rises = 0;
     let mut iterations = 0;
     let ending = loop {
         if iterations == options.max_iterations {
@@ -131,9 +58,6 @@ pub(super) fn iterate(engine: &mut dyn Engine, options: &Options, samples: usize
         }
         iterations += 1;
         let Some(Proposal { predicted, largest }) = engine.propose(damping) else {
-            if !damped {
-                break Ending::Degenerate;
-            }
             damping = (damping * growth).max(1e-12);
             growth *= 2.0;
             if damping > LARGEST_DAMPING {
@@ -146,10 +70,7 @@ pub(super) fn iterate(engine: &mut dyn Engine, options: &Options, samples: usize
         }
         let small_step = largest < options.step_tolerance;
         // Linearising costs little more than the cost alone, and most trials are accepted.
-        let Some(trial) = engine.attempt().filter(|trial| !damped || *trial < cost) else {
-            if !damped {
-                break Ending::Diverged;
-            }
+        let Some(trial) = engine.attempt().filter(|trial| *trial < cost) else {
             // Rounding: nothing left to gain although the model promises a trace.
             if small_step || predicted <= 1e-9 * cost.max(floor) {
                 break Ending::ConvergedStep;
@@ -165,18 +86,11 @@ pub(super) fn iterate(engine: &mut dyn Engine, options: &Options, samples: usize
         let previous = cost;
         engine.accept();
         cost = trial;
-        if damped {
-            let ratio = decrease / predicted;
-            damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(LARGEST_RELIEF);
-            damping = damping.max(1e-15);
-            growth = 2.0;
-        } else if decrease < 0.0 {
-            rises += 1;
-            if rises == 5 {
-                break Ending::Diverged;
-            }
-        }
-        if decrease.abs() <= options.cost_tolerance * previous {
+        let ratio = decrease / predicted;
+        damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(LARGEST_RELIEF);
+        damping = damping.max(1e-15);
+        growth = 2.0;
+        if decrease <= options.cost_tolerance * previous {
             break Ending::ConvergedCost;
         }
         if small_step {

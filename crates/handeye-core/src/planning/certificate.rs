@@ -183,20 +183,20 @@ fn line_search(
     if at_start <= 0.0 {
         return None;
     }
-    let look = |step: f64| {
+    let slope_at = |step: f64| {
         let there = objective.expand(&(reference + direction * step))?;
         let slope = there.gradient.dot(direction);
         Some((slope, there))
     };
     let (mut low, mut above, mut found) = (0.0, at_start, None);
-    let (mut high, mut below) = match look(1.0) {
+    let (mut high, mut below) = match slope_at(1.0) {
         Some((slope, there)) if slope >= -ENOUGH * at_start => return Some((1.0, there)),
         Some((slope, _)) => (1.0, slope),
         None => (1.0, -at_start),
     };
     for _ in 0..TRIES {
         let step = (low * below - high * above) / (below - above);
-        let Some((slope, there)) = look(step) else {
+        let Some((slope, there)) = slope_at(step) else {
             high = step;
             continue;
         };

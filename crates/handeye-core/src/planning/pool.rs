@@ -10,8 +10,8 @@
 use nalgebra::{DMatrix, Matrix6};
 
 use super::objective::Objective;
+use crate::batched_algebra::{factorise, log_pivots};
 use crate::information::semidefinite_root;
-use crate::lanes::{factorise, log_pivots};
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
 
 /// Parameters of the hand-eye.

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::pool::Pool;
 use super::*;
-use crate::information::{CandidateModel, Sight};
+use crate::information::{CandidateModel, Visibility};
 use crate::least_squares::tests::Cell;
 use crate::simd::VectorUnit;
 
@@ -20,7 +20,7 @@ fn pool(seed: u64, size: usize) -> (DMatrix<f64>, Vec<DMatrix<f64>>) {
         robot: None,
         pixel_parameters: None,
         kinematic_count: 0,
-        sight: Sight { image: None, margin_px: 0.0, fewest: 1 },
+        visibility: Visibility { image: None, margin_px: 0.0, fewest: 1 },
     };
     let all: Vec<DMatrix<f64>> = cell
         .motions

@@ -12,7 +12,7 @@ use std::arch::x86_64::{
 use std::hint::black_box;
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
-use super::{Kernel, Mask, Simd, Vector};
+use super::vector::{Kernel, Mask, Simd, Vector};
 
 const LANES: usize = 8;
 

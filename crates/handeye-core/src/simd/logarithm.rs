@@ -1,6 +1,6 @@
 //! The natural logarithm, lane by lane.
 
-use super::{Simd, Vector};
+use super::vector::{Simd, Vector};
 
 /// Terms of the series in `s^2`; at most 0.0295, so that the first one left out is below rounding.
 const TERMS: u8 = 9;

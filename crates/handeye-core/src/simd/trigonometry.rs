@@ -1,6 +1,6 @@
 //! Sine and cosine together, lane by lane.
 
-use super::{Simd, Vector};
+use super::vector::{Simd, Vector};
 
 /// Largest angle, in radians, up to which the reduction below is exact to rounding.
 pub(crate) const LARGEST_ANGLE: f64 = 1e5;

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
-use super::{Mask, Simd, Vector};
+use super::vector::{Mask, Simd, Vector};
 
 /// Twice the lanes of a unit, for kernels that are chains of dependent operations: in the time from the operands of one
 /// to its result a unit begins several.

@@ -58,7 +58,7 @@ def camera_of(
         raise InputError(
             "a camera matrix of zeros: this camera was never calibrated",
             code="not_calibrated",
-            hint="calibrate it, or leave the camera away: it is calibrated from the pictures then",
+            hint="calibrate it, or leave the camera out: it is calibrated from the pictures then",
         )
     coefficients = np.array(distortion, dtype=np.float64)
     if not coefficients.any() and name not in _FISHEYE:
@@ -69,7 +69,7 @@ def camera_of(
         raise InputError(
             f"distortion model {name}: its coefficients lead from pixels to rays, expected those of OpenCV",
             code="unknown_lens",
-            hint="calibrate it with OpenCV, or leave it away: it is calibrated from the pictures then",
+            hint="calibrate it with OpenCV, or leave it out: it is calibrated from the pictures then",
         )
     if name not in _FISHEYE | _BROWN:
         known = ", ".join(sorted(_BROWN - _INVERSE | _FISHEYE))

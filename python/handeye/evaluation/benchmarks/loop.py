@@ -18,8 +18,8 @@ from handeye.evaluation.benchmarks.options import Options
 from handeye.evaluation.parallel import Progress
 from handeye.planning import Planner
 from handeye.planning.collisions import Body
+from handeye.planning.constraints import ViewConstraints
 from handeye.planning.feasibility import Generator as CandidateGenerator
-from handeye.planning.sieve import Sieve
 from handeye.robots import Arm
 from handeye.session import attempt, choosing, loop, taking
 from handeye.session.configuration import Collisions, Configuration, begin, prepare
@@ -41,7 +41,7 @@ _STAGES: tuple[tuple[str, object, str], ...] = (
     ("pose of the view", Measurements, "with_views"),
     ("mistakes", loop, "examine"),
     ("candidates", CandidateGenerator, "draw"),
-    ("visibility", Sieve, "sift"),
+    ("visibility", ViewConstraints, "passing"),
     ("kinematics", Arm, "forward"),
     ("kinematics", Arm, "inverse_all"),
     ("collisions", Body, "obstacles"),

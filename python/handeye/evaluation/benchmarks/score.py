@@ -52,16 +52,10 @@ def bench_score(options: Options, progress: Progress) -> dict[str, Any]:
 
 def belief_of(cell: Cell, *, free: int = 0, noise_aware: bool = False) -> tuple[_core.Belief, FloatArray]:
     """Return what is believed after the views of a cell, and its information, at the true X and Y."""
-    camera = list(range(free)) or None
-    prior = np.diag(1 / np.square(CAMERA_SIGMA[:free])) if free else None
-    model = _core.Model(
-        np.full(cell.views, SIGMA_PX),
-        robot_side="left" if noise_aware else None,
-        robot_roots=ROBOT_ROOT[None] if noise_aware else None,
-        free_camera=camera,
-        pixel_prior=prior,
-    )
-    information = cell.problem().solve(cell.X, cell.Y, model, max_iterations=0).information
+    predictor = predictor_of(cell, sight=False, free=free, noise_aware=noise_aware)
+    information: FloatArray = predictor.informations(cell.motions).sum(axis=0)
+    if free:
+        information[12:, 12:] += np.diag(1 / np.square(CAMERA_SIGMA[:free]))
     return _core.Belief(information), information
 
 

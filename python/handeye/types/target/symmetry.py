@@ -4,7 +4,7 @@ A permutation `p` of the points stands for a turn: the turned point i lies where
 
     points[p] = R (points - centre) + centre.
 
-Whoever sees only the points cannot tell the board from the turned board: a detection that says point i
+From the points alone one cannot tell the board from the turned board: a detection that says point i
 may as well mean point p[i]. Only turns matter, not reflections: a board is seen from its front.
 """
 

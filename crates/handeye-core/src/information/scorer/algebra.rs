@@ -2,7 +2,7 @@
 
 use super::block::{BLOCK, Block, Row};
 use super::forms::{Form, Moved, packed};
-use crate::lanes::{UPPER, load, upper};
+use crate::batched_algebra::{UPPER, load, upper};
 use crate::simd::{Kernel, Simd, Twin, Vector, ln};
 
 /// Pivots of a covariance below this fraction of their diagonal are rounding.

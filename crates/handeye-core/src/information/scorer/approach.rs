@@ -1,8 +1,9 @@
 //! From robot motions to camera poses: check that they are rigid, then `X A` and `X A Y`.
 
 use super::block::{BLOCK, Block};
-use crate::lanes::{left_product, right_product, store};
+use crate::batched_algebra::store;
 use crate::se3::RIGID_TOLERANCE;
+use crate::se3::{left_product, right_product};
 use crate::simd::{Kernel, Mask, Simd, Vector};
 
 /// Doubles of a homogeneous 4 x 4 matrix.

@@ -2,7 +2,7 @@
 
 use std::ops::{Deref, DerefMut};
 
-use crate::lanes::UPPER;
+use crate::batched_algebra::UPPER;
 use crate::simd::MAX_LANES;
 
 /// Candidates in a block: a multiple of every unit's lanes, few enough that a block stays in the nearest cache.

@@ -5,8 +5,10 @@
 
 use super::block::{BLOCK, Block};
 use super::target::{Target, Way, advance};
+use super::window::Window;
+use crate::batched_algebra::{UPPER, load, store, upper};
+use crate::camera::distort;
 use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
-use crate::lanes::{UPPER, Window, bend, load, store, upper};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// Sums the information, divided by `f_x^2`, of the points in sight, and counts them.
@@ -56,14 +58,17 @@ fn sum<S: Simd, const RATIONAL: bool, const PRISM: bool>(
                 let depth = point[2];
                 let w = one / depth;
                 let (x, y) = (point[0] * w, point[1] * w);
-                let bent = bend::<S, RATIONAL, PRISM>(simd, parameters, x, y);
-                let in_sight = bent.in_sight(simd, window) & depth.greater(simd.splat(MIN_DEPTH_M));
+                let distorted = distort::<S, RATIONAL, PRISM>(simd, parameters, x, y);
+                let in_sight = window.shows(simd, &distorted) & depth.greater(simd.splat(MIN_DEPTH_M));
                 seen = seen + one.keep(in_sight);
                 let (w, x, y) = (w.keep(in_sight), x.keep(in_sight), y.keep(in_sight));
                 let aspect = simd.splat(parameters[1] / parameters[0]);
                 let rows = [
-                    (bent.along_x.keep(in_sight), bent.cross_x.keep(in_sight)),
-                    ((bent.cross_y * aspect).keep(in_sight), (bent.along_y * aspect).keep(in_sight)),
+                    (distorted.along_x.keep(in_sight), distorted.cross_x.keep(in_sight)),
+                    (
+                        (distorted.cross_y * aspect).keep(in_sight),
+                        (distorted.along_y * aspect).keep(in_sight),
+                    ),
                 ];
                 for (a, b) in rows {
                     let s = a.mul_add(x, b * y);

@@ -18,6 +18,7 @@ mod target;
 mod tests;
 mod wide_algebra;
 mod wide_points;
+mod window;
 
 use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3};
 
@@ -30,14 +31,16 @@ use self::pinhole::Pinhole;
 use self::target::Target;
 use self::wide_algebra::{Outcome, Wide};
 use self::wide_points::{Column, WidePoints};
+use self::window::Window;
 use super::belief::Belief;
 use super::candidate::{CandidateModel, Execution, Motions, Sums};
 use super::criteria::{Gain, Quantity};
+use crate::batched_algebra::{UPPER, upper};
 use crate::camera::{Camera, Lens};
 use crate::error::Error;
-use crate::lanes::{UPPER, Window, entries, upper};
 use crate::least_squares::{PixelParameters, Side};
 use crate::se3::Se3;
+use crate::se3::entries;
 use crate::simd::{VectorUnit, dispatch};
 
 /// Everything about a call that does not change from candidate to candidate.
@@ -193,8 +196,8 @@ impl<'a> Scorer<'a> {
                 dispatch(self.unit, WidePoints::<$($flag),*> { parameters, columns, window, target, block })
             }};
         }
-        let bends = !matches!(self.model.camera.lens, Lens::Pinhole | Lens::KannalaBrandt);
-        if !bends && self.inform_of_plane(window, target, block) {
+        let distorts = !matches!(self.model.camera.lens, Lens::Pinhole | Lens::KannalaBrandt);
+        if !distorts && self.inform_of_plane(window, target, block) {
             return;
         }
         match (self.model.camera.lens, self.columns.is_empty()) {
@@ -249,7 +252,7 @@ impl<'a> Scorer<'a> {
             // Lanes leave out what is common to all points.
             scale = (self.model.camera.parameters[0] / self.model.pixel_sigma).powi(2);
         }
-        let fewest = self.model.sight.fewest.max(1) as f64;
+        let fewest = self.model.visibility.fewest.max(1) as f64;
         match goal {
             Goal::Entropy(Entropies { with, without }) => {
                 let mut determinants = [1.0; BLOCK];
@@ -306,8 +309,8 @@ fn columns(parameters: &PixelParameters) -> Vec<Column> {
 fn window(model: &CandidateModel<'_>) -> Window {
     let camera: &Camera = model.camera;
     let [fx, fy, cx, cy] = [0, 1, 2, 3].map(|i| camera.parameters[i]);
-    let margin = model.sight.margin_px;
-    let (x, y) = match model.sight.image {
+    let margin = model.visibility.margin_px;
+    let (x, y) = match model.visibility.image {
         None => ([f64::NEG_INFINITY, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]),
         Some([width, height]) => (
             [(margin - cx) / fx, (width - 1.0 - margin - cx) / fx],

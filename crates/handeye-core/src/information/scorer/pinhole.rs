@@ -4,8 +4,9 @@ use super::block::{BLOCK, Block};
 use super::forms::packed;
 use super::target::{Target, Way, advance};
 use super::wide_points::Column;
+use super::window::Window;
+use crate::batched_algebra::{PlaneMoments, load, store, upper};
 use crate::camera::MIN_DEPTH_M;
-use crate::lanes::{PlaneMoments, Window, load, store, upper};
 use crate::simd::{Kernel, Mask, Simd, Vector};
 
 /// A plane nearer to the camera than this, in distances of the target, is seen from the side: inverse depths are not
@@ -106,7 +107,7 @@ fn whole<S: Simd>(simd: S, window: &Window, target: &Target, pose: &[S::Vector; 
     if window.is_everything() {
         return inside.all();
     }
-    // Edges in by a trace: whoever stands on one is looked at point by point.
+    // Edges in by a trace: a board on one is looked at point by point.
     let trace = |bound: f64| 1e-9 * (1.0 + bound.abs());
     let low = |bound: f64| bound + trace(bound);
     let high = |bound: f64| bound - trace(bound);

@@ -7,7 +7,7 @@ use crate::camera::{Camera, Feature, Lens};
 use crate::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, ToolPoint, Trace,
 };
-use crate::information::{Belief, CandidateModel, Execution, Motions, Sight, Supposition};
+use crate::information::{Belief, CandidateModel, Execution, Motions, Supposition, Visibility};
 use crate::least_squares::{PixelParameters, Side};
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
@@ -50,7 +50,7 @@ struct Scene {
     robot: Option<(Side, Matrix6<f64>)>,
     pixel_parameters: Option<PixelParameters>,
     kinematic_count: usize,
-    sight: Sight,
+    visibility: Visibility,
     belief: Belief,
     motions: Vec<Se3>,
 }
@@ -77,7 +77,7 @@ impl Scene {
                 x.inverse() * view * y.inverse()
             })
             .collect();
-        let sight = Sight { image: Some([1280.0, 1024.0]), margin_px: 8.0, fewest: 4 };
+        let visibility = Visibility { image: Some([1280.0, 1024.0]), margin_px: 8.0, fewest: 4 };
         let mut scene = Self {
             camera,
             x,
@@ -86,7 +86,7 @@ impl Scene {
             robot: None,
             pixel_parameters: None,
             kinematic_count: 0,
-            sight,
+            visibility,
             belief: Belief::new(DMatrix::identity(12, 12)).unwrap(),
             motions,
         };
@@ -131,7 +131,7 @@ impl Scene {
             robot: self.robot,
             pixel_parameters: self.pixel_parameters.as_ref(),
             kinematic_count: self.kinematic_count,
-            sight: self.sight,
+            visibility: self.visibility,
         }
     }
 
@@ -201,7 +201,7 @@ proptest! {
             1 => Some((Side::Left, robot_root(random))),
             _ => Some((Side::Right, robot_root(random))),
         };
-        scene.sight.fewest = fewest;
+        scene.visibility.fewest = fewest;
         // Few points may lie on one line, whose information is singular but for rounding.
         let tolerance = if fewest < 8 { 1e-7 } else { 1e-10 };
         scene.check(&Entropy, tolerance)?;
@@ -214,7 +214,7 @@ proptest! {
         lens in prop::sample::select(Lens::ALL.to_vec()),
     ) {
         let mut scene = Scene::new(&mut Random::new(seed), lens, 60, false, 0.0);
-        scene.sight.image = None;
+        scene.visibility.image = None;
         scene.keep_distance();
         scene.check(&Entropy, 1e-8)?;
     }
@@ -253,13 +253,12 @@ proptest! {
         };
         let camera: Vec<usize> = (0..lens.parameter_count()).filter(|i| free[*i]).collect();
         let count = camera.len() + usize::from(board_scale);
-        scene.pixel_parameters = (count > 0).then(|| PixelParameters {
+        scene.pixel_parameters = (count > 0).then_some(PixelParameters {
             camera,
             board_scale,
-            prior_information: DMatrix::zeros(count, count),
         });
         scene.kinematic_count = kinematic_count;
-        scene.sight.fewest = 8;
+        scene.visibility.fewest = 8;
         scene.belief = scene.start();
         scene.keep_distance();
         let tolerance = if count > 6 { 1e-7 } else { 1e-8 };
@@ -277,10 +276,9 @@ fn moments_of_a_plane_serve_the_camera_too() {
         let random = &mut Random::new(20 + seed as u64);
         let mut scene = Scene::new(random, Lens::Pinhole, 90, seed % 2 == 1, 0.0);
         scene.robot = (seed > 1).then(|| (Side::Right, robot_root(random)));
-        let prior_information = DMatrix::zeros(camera.len(), camera.len());
-        scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false, prior_information });
+        scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false });
         scene.belief = scene.start();
-        scene.sight.fewest = 8;
+        scene.visibility.fewest = 8;
         scene.keep_distance();
         for criterion in criteria() {
             scene.check(criterion.as_ref(), 1e-9).unwrap();
@@ -295,9 +293,8 @@ fn boards_are_seen_from_the_side_too() {
         let random = &mut Random::new(31);
         let mut scene = Scene::new(random, Lens::Pinhole, 0, false, 0.0);
         if pixel {
-            let prior_information = DMatrix::zeros(2, 2);
             let camera = vec![0, 2];
-            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false, prior_information });
+            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false });
             scene.belief = scene.start();
         }
         for round in 0..60 {
@@ -319,10 +316,9 @@ fn a_mean_over_suppositions_is_the_mean_of_each() {
     for lens in [Lens::Pinhole, Lens::BrownConrady5, Lens::KannalaBrandt] {
         let random = &mut Random::new(30);
         let mut scene = Scene::new(random, lens, 70, false, 0.0);
-        let prior_information = DMatrix::zeros(3, 3);
         let camera = vec![0, 2, 4];
         if lens != Lens::Pinhole {
-            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false, prior_information });
+            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false });
             scene.belief = scene.start();
         }
         let wider = Belief::new(scene.belief.information() * 0.5).unwrap();
@@ -381,7 +377,7 @@ fn few_points_in_sight_leave_directions_open() {
     // One or two points: an information of rank two or four.
     let mut scene = Scene::new(&mut Random::new(11), Lens::Pinhole, 200, false, 0.0);
     scene.features.truncate(2);
-    scene.sight.fewest = 1;
+    scene.visibility.fewest = 1;
     let gains = scene.check(&Entropy, 1e-9).unwrap();
     assert!(gains.iter().filter(|g| g.is_finite()).count() > 100);
 }

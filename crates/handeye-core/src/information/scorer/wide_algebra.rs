@@ -7,7 +7,7 @@
 use super::algebra::{NULL_PIVOT, add_square, spread};
 use super::block::{BLOCK, Block, Row};
 use super::forms::{Form, Moved, Observed, packed};
-use crate::lanes::{UPPER, load, upper};
+use crate::batched_algebra::{UPPER, load, upper};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// What is wanted of a block.

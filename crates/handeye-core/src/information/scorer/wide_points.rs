@@ -3,8 +3,9 @@
 use super::block::{BLOCK, Block};
 use super::forms::packed;
 use super::target::{Patch, Target};
-use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
-use crate::lanes::{Bent, Window, bend, load};
+use super::window::Window;
+use crate::batched_algebra::load;
+use crate::camera::{DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, coefficient_derivative, distort};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// Points whose rows of `d pi / d [eta; c]` are squared together: a sum is fetched once for all of them.
@@ -70,7 +71,7 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool> Kernel
             let mut filled = 0;
             for (y, z, along) in self.target.patches.iter().flat_map(Patch::lines) {
                 for x in along {
-                    seen = seen + self.look::<S>(simd, &pose, [x, y, z], &mut rows, filled);
+                    seen = seen + self.point_rows::<S>(simd, &pose, [x, y, z], &mut rows, filled);
                     filled += 1;
                     if filled == TOGETHER {
                         add_squares(simd, &rows[..size], &moves, &mut self.block.information, at);
@@ -98,7 +99,7 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
 {
     /// Writes the two rows of a point, zero where it is not in sight; one where it is.
     #[inline(always)]
-    fn look<S: Simd>(
+    fn point_rows<S: Simd>(
         &self,
         simd: S,
         pose: &[S::Vector; 12],
@@ -118,14 +119,17 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
         let w = one / depth;
         let x = (turned[0] + pose[9]) * w;
         let y = (turned[1] + pose[10]) * w;
-        let bent: Bent<S::Vector> =
-            if DISTORTED { bend::<S, RATIONAL, PRISM>(simd, p, x, y) } else { Bent::straight(simd, x, y) };
-        let in_sight = bent.in_sight(simd, self.window) & depth.greater(simd.splat(MIN_DEPTH_M));
+        let distorted: DistortedPoint<S::Vector> = if DISTORTED {
+            distort::<S, RATIONAL, PRISM>(simd, p, x, y)
+        } else {
+            DistortedPoint::unchanged(simd, x, y)
+        };
+        let in_sight = self.window.shows(simd, &distorted) & depth.greater(simd.splat(MIN_DEPTH_M));
         let (w, x, y) = (w.keep(in_sight), x.keep(in_sight), y.keep(in_sight));
         let aspect = simd.splat(p[1] / p[0]);
         let jacobian = [
-            (bent.along_x.keep(in_sight), bent.cross_x.keep(in_sight)),
-            ((bent.cross_y * aspect).keep(in_sight), (bent.along_y * aspect).keep(in_sight)),
+            (distorted.along_x.keep(in_sight), distorted.cross_x.keep(in_sight)),
+            ((distorted.cross_y * aspect).keep(in_sight), (distorted.along_y * aspect).keep(in_sight)),
         ];
         for (row, (a, b)) in jacobian.into_iter().enumerate() {
             let s = a.mul_add(x, b * y);
@@ -148,12 +152,12 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
                     }
                     (pair[0], pair[1])
                 }
-                Column::Camera(0) => (bent.x * inverse_focal, zero),
-                Column::Camera(1) => (zero, bent.y * inverse_focal),
+                Column::Camera(0) => (distorted.x * inverse_focal, zero),
+                Column::Camera(1) => (zero, distorted.y * inverse_focal),
                 Column::Camera(2) => (inverse_focal, zero),
                 Column::Camera(3) => (zero, inverse_focal),
                 Column::Camera(i) => {
-                    let (u, v) = coefficient(simd, *i, x, y, &bent);
+                    let (u, v) = coefficient_derivative(simd, *i, x, y, &distorted);
                     (u, v * aspect)
                 }
             };
@@ -162,35 +166,6 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
         }
         one.keep(in_sight)
     }
-}
-
-/// Derivative of a point after the lens in a distortion coefficient, as `camera::brown_conrady::coefficients`.
-#[inline(always)]
-fn coefficient<S: Simd>(
-    simd: S,
-    parameter: usize,
-    x: S::Vector,
-    y: S::Vector,
-    bent: &Bent<S::Vector>,
-) -> (S::Vector, S::Vector) {
-    let zero = simd.splat(0.0);
-    let two = simd.splat(2.0);
-    let s = bent.squared_radius;
-    let radial = match parameter {
-        4 => bent.inverse_denominator * s,
-        5 => bent.inverse_denominator * s * s,
-        8 => bent.inverse_denominator * s * s * s,
-        9 => -(bent.radial * bent.inverse_denominator * s),
-        10 => -(bent.radial * bent.inverse_denominator * s * s),
-        11 => -(bent.radial * bent.inverse_denominator * s * s * s),
-        6 => return (two * x * y, (two * y).mul_add(y, s)),
-        7 => return ((two * x).mul_add(x, s), two * x * y),
-        12 => return (s, zero),
-        13 => return (s * s, zero),
-        14 => return (zero, s),
-        _ => return (zero, s * s),
-    };
-    (x * radial, y * radial)
 }
 
 /// Adds the squares of the rows to the information; what moves no point along an axis has no product there.

@@ -3,6 +3,7 @@
 import ctypes
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -26,6 +27,7 @@ INCLUDES = (
     Path("/usr/local/include/eigen3"),
 )  # fmt: skip
 COMPILE_S = 300
+INSTALL_CERES = "apt-get install libceres-dev (Debian, Ubuntu) or brew install ceres-solver (macOS)"
 
 
 def compiler() -> str:
@@ -108,7 +110,12 @@ def ceres_solve() -> Callable[[Cell, FloatArray, int], FloatArray]:
     MissingPeerError
         Ceres is not there.
     """
-    function = built("ceres_solve", ["ceres", "glog"]).solve
+    try:
+        function = built("ceres_solve", ["ceres", "glog"]).solve
+    except MissingPeerError as missing:
+        if not re.search(r"ceres/|-lceres|-lglog|glog/", str(missing)):
+            raise
+        raise MissingPeerError(f"Ceres for C++ is not installed: {INSTALL_CERES}") from None
     function.restype = ctypes.c_int
 
     def solve(cell: Cell, start: FloatArray, mode: int) -> FloatArray:

@@ -1,0 +1,166 @@
+//! What stands in a cell, and what was measured there.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::pose_measurement::PoseMeasurement;
+use crate::error::Error;
+use crate::se3::Se3;
+
+/// What a camera or a target is fixed to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Body {
+    /// The flange of the arm.
+    Flange,
+    /// Its base, or anything that does not move against it.
+    Base,
+}
+
+/// What is believed of a camera's free parameters beforehand: a Gaussian around `mean`, relative to the values at which
+/// the measurements were made.
+#[derive(Clone, Debug)]
+pub struct CameraPrior {
+    /// Information, square.
+    pub information: DMatrix<f64>,
+    /// Mean, relative to the present values.
+    pub mean: DVector<f64>,
+    /// Whether the covariance may be larger than stated, by a level that is found.
+    pub inflated: bool,
+}
+
+/// A camera: what it is fixed to, and its free parameters.
+#[derive(Clone, Debug)]
+pub struct SeenBy {
+    /// What it is fixed to.
+    pub body: Body,
+    /// Free parameters, without the scale of a board.
+    pub parameters: usize,
+    /// `None`: nothing but what the pictures say.
+    pub prior: Option<CameraPrior>,
+}
+
+/// One stop of the arm.
+#[derive(Clone, Debug)]
+pub struct Station {
+    /// `T_base_flange` as reported.
+    pub pose: Se3,
+    /// Twist of the flange in its own frame per joint, `6 x n`: truly `T exp(J dq)`; `None` where the arm is not known.
+    pub joints: Option<DMatrix<f64>>,
+    /// The same per way of displacing a joint on its link, `6 x m`.
+    pub links: Option<DMatrix<f64>>,
+}
+
+/// One detection of a target in a picture.
+#[derive(Clone, Debug)]
+pub struct Measurement {
+    /// Where the arm stood.
+    pub station: usize,
+    /// Which camera.
+    pub camera: usize,
+    /// Which target.
+    pub target: usize,
+    /// The pose of the target in the camera; its sensitivity has a column per free parameter of the camera and, last,
+    /// one for the scale of the board where [`Cell::board_scale`] says so.
+    pub pose: PoseMeasurement,
+    /// Variance of the pixels, px^2.
+    pub variance_px2: f64,
+}
+
+/// A cell and what was measured in it.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    /// Stops of the arm.
+    pub stations: Vec<Station>,
+    /// Cameras.
+    pub cameras: Vec<SeenBy>,
+    /// What each target is fixed to.
+    pub targets: Vec<Body>,
+    /// Whether the scale of every board is a parameter.
+    pub board_scale: bool,
+    /// Detections, by station.
+    pub measurements: Vec<Measurement>,
+}
+
+impl Cell {
+    /// Columns of the parameters: first those of `X` and `Y`, then of the cameras, then scales of the boards.
+    pub(super) fn columns(&self) -> Columns {
+        let poses = 6 * (self.cameras.len() + self.targets.len());
+        let mut camera = Vec::with_capacity(self.cameras.len());
+        let mut next = poses;
+        for one in &self.cameras {
+            camera.push(next);
+            next += one.parameters;
+        }
+        let boards = next;
+        Columns {
+            targets: 6 * self.cameras.len(),
+            camera,
+            boards,
+            end: boards + if self.board_scale { self.targets.len() } else { 0 },
+        }
+    }
+
+    /// The middle `M` of the chain `X M Y` at a station.
+    pub(super) fn middle(&self, m: &Measurement) -> Se3 {
+        let pose = &self.stations[m.station].pose;
+        match (self.cameras[m.camera].body, self.targets[m.target]) {
+            (Body::Flange, Body::Base) => pose.inverse(),
+            (Body::Base, Body::Flange) => *pose,
+            _ => Se3::identity(),
+        }
+    }
+
+    /// # Errors
+    /// [`Error::InvalidInput`] naming what does not fit.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        if self.cameras.is_empty() || self.targets.is_empty() || self.measurements.is_empty() {
+            return Err(Error::invalid("a cell needs a camera, a target and a measurement"));
+        }
+        if !self.measurements.is_sorted_by_key(|m| m.station) {
+            return Err(Error::invalid("measurements must come station by station"));
+        }
+        for (k, m) in self.measurements.iter().enumerate() {
+            let known = m.station < self.stations.len()
+                && m.camera < self.cameras.len()
+                && m.target < self.targets.len();
+            if !known {
+                return Err(Error::invalid(format!(
+                    "measurement {k}: no such station, camera or target ({}, {}, {})",
+                    m.station, m.camera, m.target
+                )));
+            }
+            let columns = self.cameras[m.camera].parameters + usize::from(self.board_scale);
+            if m.pose.sensitivity.ncols() != columns {
+                return Err(Error::invalid(format!(
+                    "measurement {k}: {} columns of sensitivity, expected {columns}",
+                    m.pose.sensitivity.ncols()
+                )));
+            }
+            if !(m.variance_px2 > 0.0 && m.variance_px2.is_finite()) {
+                return Err(Error::invalid(format!("measurement {k}: pixel variance {}", m.variance_px2)));
+            }
+        }
+        for (c, camera) in self.cameras.iter().enumerate() {
+            let fits = |p: &CameraPrior| {
+                p.information.shape() == (camera.parameters, camera.parameters)
+                    && p.mean.len() == camera.parameters
+            };
+            if camera.prior.as_ref().is_some_and(|p| !fits(p)) {
+                return Err(Error::invalid(format!("camera {c}: its prior is not of its parameters")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where parameters stand.
+#[derive(Clone, Debug)]
+pub(super) struct Columns {
+    /// First of the targets' twists; the cameras' begin at zero.
+    pub targets: usize,
+    /// First of each camera's parameters.
+    pub camera: Vec<usize>,
+    /// First of the scales of the boards.
+    pub boards: usize,
+    /// One beyond the last.
+    pub end: usize,
+}

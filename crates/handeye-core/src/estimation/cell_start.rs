@@ -1,0 +1,111 @@
+//! Where an estimate of a whole cell begins: pair by pair of camera and target.
+
+use nalgebra::Matrix6;
+
+use super::cell::{Cell, Measurement};
+use super::start::{WeakPrior, start_from_poses};
+use crate::error::Error;
+use crate::se3::Se3;
+
+/// Poses of a cell to begin with.
+#[derive(Clone, Debug)]
+pub struct CellStart {
+    /// `X` of each camera.
+    pub x: Vec<Se3>,
+    /// `Y` of each target.
+    pub y: Vec<Se3>,
+    /// Where the first pair began: a closed form's name, `"given"`, or `"axes"`.
+    pub origin: &'static str,
+}
+
+/// Finds all poses of a cell from its measurements; `given` is tried among other starts.
+///
+/// # Errors
+/// [`Error::InvalidInput`] where a camera or target is not tied to the arm by any measurement.
+pub fn start_of_cell(
+    cell: &Cell,
+    weak: &WeakPrior,
+    given: Option<(&[Se3], &[Se3])>,
+) -> Result<CellStart, Error> {
+    cell.check()?;
+    let mut x: Vec<Option<Se3>> = vec![None; cell.cameras.len()];
+    let mut y: Vec<Option<Se3>> = vec![None; cell.targets.len()];
+    let mut origin = None;
+    let of = |c: usize, t: usize| -> Vec<&Measurement> {
+        cell.measurements.iter().filter(|m| m.camera == c && m.target == t).collect()
+    };
+    let mut pairs: Vec<(usize, usize)> = Vec::new();
+    for c in 0..cell.cameras.len() {
+        for t in 0..cell.targets.len() {
+            if !of(c, t).is_empty() {
+                pairs.push((c, t));
+            }
+        }
+    }
+    // Most views first; pairs that move against each other before those that do not.
+    pairs.sort_by_key(|(c, t)| {
+        let still = cell.cameras[*c].body == cell.targets[*t];
+        (still, std::cmp::Reverse(of(*c, *t).len()))
+    });
+    loop {
+        let open = |x: &[Option<Se3>], y: &[Option<Se3>], (c, t): (usize, usize)| {
+            x[c].is_none() || y[t].is_none()
+        };
+        // Of those with a known end first: their other end follows.
+        let next = pairs
+            .iter()
+            .find(|(c, t)| x[*c].is_some() != y[*t].is_some())
+            .or_else(|| pairs.iter().find(|p| open(&x, &y, **p)))
+            .copied();
+        let Some((c, t)) = next else { break };
+        let views = of(c, t);
+        match (x[c], y[t]) {
+            (Some(known), _) => {
+                let implied = |m: &&Measurement| (known * cell.middle(m)).inverse() * m.pose.pose;
+                y[t] = Some(middle_of(views.iter().map(implied)));
+            }
+            (None, Some(known)) => {
+                let implied = |m: &&Measurement| m.pose.pose * (cell.middle(m) * known).inverse();
+                x[c] = Some(middle_of(views.iter().map(implied)));
+            }
+            (None, None) if cell.cameras[c].body == cell.targets[t] => {
+                return Err(Error::invalid(format!(
+                    "camera {c} and target {t} do not move against each other and nothing ties them to the arm"
+                )));
+            }
+            (None, None) => {
+                let motions: Vec<Se3> = views.iter().map(|m| cell.middle(m)).collect();
+                let poses: Vec<Se3> = views.iter().map(|m| m.pose.pose).collect();
+                let covariances: Vec<Matrix6<f64>> =
+                    views.iter().map(|m| m.pose.covariance * m.variance_px2 + slack()).collect();
+                let given = given.map(|(x, y)| (x[c], y[t]));
+                let found = start_from_poses(&motions, &poses, &covariances, weak, given)?;
+                origin = origin.or(Some(found.origin));
+                (x[c], y[t]) = (Some(found.x), Some(found.y));
+            }
+        }
+    }
+    let all = |poses: Vec<Option<Se3>>, what: &str| {
+        poses
+            .into_iter()
+            .enumerate()
+            .map(|(i, pose)| pose.ok_or_else(|| Error::invalid(format!("{what} {i} was never measured"))))
+            .collect::<Result<Vec<_>, _>>()
+    };
+    Ok(CellStart { x: all(x, "camera")?, y: all(y, "target")?, origin: origin.unwrap_or("given") })
+}
+
+/// Covariance added to the poses: a millimetre and 0.05 degrees per axis, so that a robot that is not exact does not
+/// make every start look hopeless.
+fn slack() -> Matrix6<f64> {
+    let (t, r) = (1e-3_f64, 0.05_f64.to_radians());
+    Matrix6::from_diagonal(&nalgebra::Vector6::new(t * t, t * t, t * t, r * r, r * r, r * r))
+}
+
+/// The pose that is nearest to all others: the medoid, which no outlier moves.
+fn middle_of(poses: impl Iterator<Item = Se3>) -> Se3 {
+    let poses: Vec<Se3> = poses.collect();
+    let away = |a: &Se3| poses.iter().map(|b| (*a * b.inverse()).log().norm()).sum::<f64>();
+    let best = poses.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+    best.copied().unwrap_or_else(Se3::identity)
+}

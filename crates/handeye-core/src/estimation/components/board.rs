@@ -1,0 +1,37 @@
+//! Boards that are larger or smaller than stated: printers and rulers.
+
+use crate::estimation::tuning::tune;
+use nalgebra::{DMatrix, DVector};
+
+use super::Component;
+use crate::estimation::cell::Cell;
+use crate::estimation::levels::{Level, LevelPrior};
+use crate::estimation::linearisation::Linearisation;
+use crate::estimation::mixed::{Effect, Term};
+
+/// The scale of every board, relative to one.
+pub(in crate::estimation) struct BoardScale;
+
+impl Component for BoardScale {
+    fn name(&self) -> &'static str {
+        "board_scale"
+    }
+
+    fn levels(&self) -> Vec<Level> {
+        vec![Level {
+            name: "board_scale",
+            start: 1e-4,
+            prior: LevelPrior::Deviation { size: tune(12, 1e-3), exponent: tune(13, 0.1), nothing: 1e-6 },
+        }]
+    }
+
+    fn terms(&self, cell: &Cell, _: &Linearisation) -> Vec<Term> {
+        let count = cell.targets.len();
+        let effect = Effect::Prior {
+            first: cell.columns().boards,
+            information: DMatrix::identity(count, count),
+            mean: DVector::zeros(count),
+        };
+        vec![Term { levels: vec![0], effect }]
+    }
+}

@@ -1,0 +1,41 @@
+//! Joints that stand beyond where they are read, always by the same.
+
+use crate::estimation::tuning::tune;
+use nalgebra::DMatrix;
+
+use super::{Arm, Component, per_station};
+use crate::estimation::cell::Cell;
+use crate::estimation::levels::{Level, LevelPrior};
+use crate::estimation::linearisation::Linearisation;
+use crate::estimation::mixed::{Effect, Term};
+
+/// Offsets of the joints between the first and the last, which only say where base and flange are.
+pub(in crate::estimation) struct JointOffsets {
+    offsets: Vec<DMatrix<f64>>,
+}
+
+impl JointOffsets {
+    pub(in crate::estimation) fn new(arm: &Arm) -> Self {
+        Self { offsets: arm.offsets.clone() }
+    }
+}
+
+impl Component for JointOffsets {
+    fn name(&self) -> &'static str {
+        "joint_offsets"
+    }
+
+    fn levels(&self) -> Vec<Level> {
+        let degree = 1_f64.to_radians();
+        vec![Level {
+            name: "offset_rad",
+            start: 0.01 * degree,
+            prior: LevelPrior::Deviation { size: tune(5, 0.05) * degree, exponent: tune(6, 0.02), nothing: 1e-4 * degree },
+        }]
+    }
+
+    fn terms(&self, _: &Cell, linearisation: &Linearisation) -> Vec<Term> {
+        let columns = per_station(linearisation, |rows| &rows.flange * &self.offsets[rows.station]);
+        vec![Term { levels: vec![0], effect: Effect::Constant(columns) }]
+    }
+}

@@ -1,0 +1,54 @@
+//! Joints that sit a little beside where the description has them on the link before: displaced, or tilted.
+
+use crate::estimation::tuning::tune;
+use nalgebra::DMatrix;
+
+use super::{Arm, Component, per_station};
+use crate::estimation::cell::Cell;
+use crate::estimation::levels::{Level, LevelPrior};
+use crate::estimation::linearisation::Linearisation;
+use crate::estimation::mixed::{Effect, Term};
+
+/// Displacements in metres and tilts in radians, each with a level of its own.
+pub(in crate::estimation) struct Links {
+    lengths: Vec<DMatrix<f64>>,
+    angles: Vec<DMatrix<f64>>,
+}
+
+impl Links {
+    pub(in crate::estimation) fn new(arm: &Arm) -> Self {
+        Self { lengths: arm.lengths.clone(), angles: arm.angles.clone() }
+    }
+}
+
+impl Component for Links {
+    fn name(&self) -> &'static str {
+        "links"
+    }
+
+    fn levels(&self) -> Vec<Level> {
+        let degree = 1_f64.to_radians();
+        vec![
+            Level {
+                name: "link_m",
+                start: 1e-4,
+                prior: LevelPrior::Deviation { size: tune(7, 5e-4), exponent: tune(8, 0.02), nothing: 1e-6 },
+            },
+            Level {
+                name: "link_rad",
+                start: 0.005 * degree,
+                prior: LevelPrior::Deviation { size: tune(9, 0.03) * degree, exponent: tune(10, 0.02), nothing: 1e-4 * degree },
+            },
+        ]
+    }
+
+    fn terms(&self, _: &Cell, linearisation: &Linearisation) -> Vec<Term> {
+        let of = |ways: &[DMatrix<f64>]| {
+            Effect::Constant(per_station(linearisation, |rows| &rows.flange * &ways[rows.station]))
+        };
+        vec![
+            Term { levels: vec![0], effect: of(&self.lengths) },
+            Term { levels: vec![1], effect: of(&self.angles) },
+        ]
+    }
+}

@@ -1,0 +1,122 @@
+//! Errors of an arm that is not described: alike where postures are alike.
+//!
+//! Links and joints that are not as the controller believes them err the same way in the same posture. Such an error is
+//! a Gaussian process over postures; with correlation `C ~ F F'` between stations it is a sum of a few functions of the
+//! posture whose coefficients are twists (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2006,
+//! section 2.2).
+
+use crate::estimation::tuning::tune;
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use super::{Component, per_station};
+use crate::estimation::cell::Cell;
+use crate::estimation::levels::{Level, LevelPrior};
+use crate::estimation::linearisation::{Linearisation, Rows};
+use crate::estimation::mixed::{Effect, Term};
+
+/// Flange poses further apart than this have little of an error in common; a chord of 2 is half a turn.
+const LIKENESS_M: f64 = 1.0;
+const LIKENESS_CHORD: f64 = 2.0;
+/// Share of the variance that no posture changes: a base or flange that is turned in itself.
+const SAME_EVERYWHERE: f64 = 0.5;
+/// Functions that carry less of the variance than this count as each station's own.
+const SMALLEST_FUNCTION: f64 = 0.01;
+/// Share of the variance that is always each station's own.
+const OWN_SHARE: f64 = 1e-3;
+
+/// A smooth error at the flange or at the base.
+pub(in crate::estimation) struct Posture {
+    name: &'static str,
+    side: usize,
+    levels: [&'static str; 2],
+    rows: fn(&Rows) -> &DMatrix<f64>,
+    /// Value of each function (columns) at each station of the cell (rows).
+    functions: DMatrix<f64>,
+    /// Root of the share of the variance that is each station's own.
+    own: Vec<f64>,
+}
+
+impl Posture {
+    /// At the flange.
+    pub fn flange(cell: &Cell) -> Self {
+        Self::new(cell, "posture_flange", ["posture_flange_rad", "posture_flange_lever_m"], 0, |rows| &rows.flange)
+    }
+
+    /// At the base.
+    pub fn base(cell: &Cell) -> Self {
+        Self::new(cell, "posture_base", ["posture_base_rad", "posture_base_lever_m"], 1, |rows| &rows.base)
+    }
+
+    fn new(
+        cell: &Cell,
+        name: &'static str,
+        levels: [&'static str; 2],
+        side: usize,
+        rows: fn(&Rows) -> &DMatrix<f64>,
+    ) -> Self {
+        let eigen = SymmetricEigen::new(likeness(cell, side));
+        let count = cell.stations.len();
+        let least = SMALLEST_FUNCTION * count as f64;
+        let kept: Vec<usize> = (0..count).filter(|i| eigen.eigenvalues[*i] > least.min(0.5)).collect();
+        let functions = DMatrix::from_fn(count, kept.len(), |k, j| {
+            eigen.eigenvectors[(k, kept[j])] * (eigen.eigenvalues[kept[j]] * (1.0 - OWN_SHARE)).sqrt()
+        });
+        let own =
+            (0..count).map(|k| (1.0 - functions.row(k).norm_squared()).max(OWN_SHARE).sqrt()).collect();
+        Self { name, side, levels, rows, functions, own }
+    }
+}
+
+/// How far a smooth error is the same at two stations.
+fn likeness(cell: &Cell, side: usize) -> DMatrix<f64> {
+    let count = cell.stations.len();
+    DMatrix::from_fn(count, count, |i, j| {
+        let (a, b) = (&cell.stations[i].pose, &cell.stations[j].pose);
+        let metres = (a.translation - b.translation).norm() / tune(16, LIKENESS_M);
+        // 2 sin(angle / 2); of the angle itself it would be no correlation.
+        let chord = (3.0 - a.rotation.dot(&b.rotation)).max(0.0).sqrt() / tune(17, LIKENESS_CHORD);
+        let alike = if i == j { 1.0 } else { (-0.5 * (metres * metres + chord * chord)).exp() };
+        tune(14 + side, SAME_EVERYWHERE) + (1.0 - tune(14 + side, SAME_EVERYWHERE)) * alike
+    })
+}
+
+impl Component for Posture {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn levels(&self) -> Vec<Level> {
+        let degree = 1_f64.to_radians();
+        vec![
+            Level {
+                name: self.levels[0],
+                start: 0.006 * degree,
+                // It hides in X and Y, where no residual shows it: more is believed of it than of the others.
+                prior: LevelPrior::Deviation {
+                    size: tune(18 + self.side, 0.02) * degree,
+                    exponent: tune(20 + self.side, 0.5),
+                    nothing: 1e-4 * degree,
+                },
+            },
+            Level { name: self.levels[1], start: tune(22 + self.side, 1.0), prior: LevelPrior::Ratio { spread: tune(24 + self.side, 0.7) } },
+        ]
+    }
+
+    fn terms(&self, _: &Cell, linearisation: &Linearisation) -> Vec<Term> {
+        let mut terms = Vec::new();
+        for (first, levels) in [(0, vec![0, 1]), (3, vec![0])] {
+            let part = |rows: &Rows| (self.rows)(rows).columns(first, 3).into_owned();
+            let shared = per_station(linearisation, |rows| {
+                let twist = part(rows);
+                let count = self.functions.ncols();
+                DMatrix::from_fn(twist.nrows(), 3 * count, |i, j| {
+                    twist[(i, j % 3)] * self.functions[(rows.station, j / 3)]
+                })
+            });
+            let own = per_station(linearisation, |rows| part(rows) * self.own[rows.station]);
+            terms.push(Term { levels: levels.clone(), effect: Effect::Recurring(shared) });
+            terms.push(Term { levels, effect: Effect::Noise(own) });
+        }
+        terms
+    }
+}

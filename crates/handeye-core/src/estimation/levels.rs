@@ -1,0 +1,58 @@
+//! How large the components of the error are, and what is believed of that beforehand.
+
+/// What is believed of the size of a component before any data, as a density of its logarithm.
+///
+/// In the spirit of penalised complexity priors (Simpson et al. 2017): nothing is the base case, and what a healthy cell
+/// never shows costs more and more. No level is kept away from zero, and none has an end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LevelPrior {
+    /// A deviation `s` of density `s^exponent exp(-s / size)` in its logarithm, down to where it is nothing.
+    Deviation {
+        /// Where sizes become rare, in the unit of the level.
+        size: f64,
+        /// How much likelier larger levels are below it; nearly nothing for what residuals show.
+        exponent: f64,
+        /// Below this it is as good as nothing.
+        nothing: f64,
+    },
+    /// A ratio, log-normal about its start.
+    Ratio {
+        /// Deviation of its logarithm.
+        spread: f64,
+    },
+}
+
+/// A level of the error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// Stable name.
+    pub name: &'static str,
+    /// Where to begin, and the median of a ratio.
+    pub start: f64,
+    /// What is believed.
+    pub prior: LevelPrior,
+}
+
+/// How sharply a level ends where it is nothing, in its logarithm.
+const WALL: f64 = 0.5;
+
+impl Level {
+    /// Minus the logarithm of the prior density of the logarithm `t`, its slope and its curvature.
+    pub(super) fn penalty(&self, t: f64) -> (f64, f64, f64) {
+        match self.prior {
+            LevelPrior::Ratio { spread } => {
+                let z = (t - self.start.ln()) / spread;
+                (0.5 * z * z, z / spread, spread.powi(-2))
+            }
+            LevelPrior::Deviation { size, exponent, nothing } => {
+                let relative = t.exp() / size;
+                let below = (nothing.ln() - t).max(0.0) / WALL;
+                (
+                    relative - exponent * t + 0.5 * below * below,
+                    relative - exponent - below / WALL,
+                    relative + if below > 0.0 { WALL.powi(-2) } else { 0.0 },
+                )
+            }
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Chains around a guess: twists between chain and measurement, and how everything moves them.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+
+use super::cell::{Body, Cell};
+use crate::se3::Se3;
+
+/// The unknown poses.
+#[derive(Clone, Debug)]
+pub(super) struct Guess {
+    /// `X` of each camera.
+    pub x: Vec<Se3>,
+    /// `Y` of each target.
+    pub y: Vec<Se3>,
+}
+
+impl Guess {
+    /// After the twists at the front of `theta`.
+    pub fn moved(&self, theta: &[f64]) -> Self {
+        let twist = |i: usize| Vector6::from_column_slice(&theta[6 * i..6 * i + 6]);
+        let cameras = self.x.len();
+        Self {
+            x: self.x.iter().enumerate().map(|(c, x)| Se3::exp(&twist(c)) * *x).collect(),
+            y: self.y.iter().enumerate().map(|(t, y)| Se3::exp(&twist(cameras + t)) * *y).collect(),
+        }
+    }
+}
+
+/// One station linearised: six rows per measurement.
+#[derive(Clone, Debug)]
+pub(super) struct Rows {
+    /// Which station of the cell.
+    pub station: usize,
+    /// Twist between chain and measurement.
+    pub e: DVector<f64>,
+    /// Its derivative in the parameters of [`Cell::columns`].
+    pub b: DMatrix<f64>,
+    /// Covariance that the pixels give it.
+    pub pixels: DMatrix<f64>,
+    /// Its derivative in a twist of the flange in its own frame.
+    pub flange: DMatrix<f64>,
+    /// Its derivative in a twist of the base.
+    pub base: DMatrix<f64>,
+}
+
+/// All stations.
+#[derive(Clone, Debug)]
+pub(super) struct Linearisation {
+    /// Stations with a measurement.
+    pub stations: Vec<Rows>,
+    /// What the pixels say of the parameters beside the poses: information and gradient.
+    pub information: DMatrix<f64>,
+    /// See `information`.
+    pub gradient: DVector<f64>,
+}
+
+/// Linearises a cell at a guess.
+pub(super) fn linearise(cell: &Cell, guess: &Guess) -> Linearisation {
+    let columns = cell.columns();
+    let mut information = DMatrix::zeros(columns.end, columns.end);
+    let mut gradient = DVector::zeros(columns.end);
+    let mut stations = Vec::new();
+    for group in cell.measurements.chunk_by(|a, b| a.station == b.station) {
+        let size = 6 * group.len();
+        let mut rows = Rows {
+            station: group[0].station,
+            e: DVector::zeros(size),
+            b: DMatrix::zeros(size, columns.end),
+            pixels: DMatrix::zeros(size, size),
+            flange: DMatrix::zeros(size, 6),
+            base: DMatrix::zeros(size, 6),
+        };
+        for (i, m) in group.iter().enumerate() {
+            let at = 6 * i;
+            let (x, y) = (&guess.x[m.camera], &guess.y[m.target]);
+            let before = *x * cell.middle(m);
+            let (of_x, of_y) = (x.adjoint(), before.adjoint());
+            let e = (before * *y * m.pose.pose.inverse()).log();
+            rows.e.rows_mut(at, 6).copy_from(&e);
+            rows.b.view_mut((at, 6 * m.camera), (6, 6)).copy_from(&Matrix6::identity());
+            rows.b.view_mut((at, columns.targets + 6 * m.target), (6, 6)).copy_from(&of_y);
+            let pixel = pixel_columns(cell, m.camera, m.target, &columns);
+            for (j, column) in pixel.iter().enumerate() {
+                rows.b.view_mut((at, *column), (6, 1)).copy_from(&m.pose.sensitivity.column(j));
+            }
+            let weight = 1.0 / m.variance_px2;
+            for (a, row) in pixel.iter().enumerate() {
+                gradient[*row] += weight * m.pose.camera_gradient[a];
+                for (b, column) in pixel.iter().enumerate() {
+                    information[(*row, *column)] += weight * m.pose.camera_information[(a, b)];
+                }
+            }
+            rows.pixels.view_mut((at, at), (6, 6)).copy_from(&(m.pose.covariance * m.variance_px2));
+            // A = T_base_flange is truly exp(base) A exp(flange), and M is A or its inverse.
+            match (cell.cameras[m.camera].body, cell.targets[m.target]) {
+                (Body::Flange, Body::Base) => {
+                    rows.flange.view_mut((at, 0), (6, 6)).copy_from(&-of_x);
+                    rows.base.view_mut((at, 0), (6, 6)).copy_from(&-of_y);
+                }
+                (Body::Base, Body::Flange) => {
+                    rows.base.view_mut((at, 0), (6, 6)).copy_from(&of_x);
+                    rows.flange.view_mut((at, 0), (6, 6)).copy_from(&of_y);
+                }
+                _ => {}
+            }
+        }
+        stations.push(rows);
+    }
+    Linearisation { stations, information, gradient }
+}
+
+/// Columns of a measurement's pixel parameters: those of its camera, then the scale of its board.
+fn pixel_columns(cell: &Cell, camera: usize, target: usize, columns: &super::cell::Columns) -> Vec<usize> {
+    let first = columns.camera[camera];
+    let mut all: Vec<usize> = (first..first + cell.cameras[camera].parameters).collect();
+    if cell.board_scale {
+        all.push(columns.boards + target);
+    }
+    all
+}

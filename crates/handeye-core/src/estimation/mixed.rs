@@ -1,0 +1,611 @@
+//! The linear mixed model: its restricted likelihood with slope and curvature, and the answer, at given levels.
+//!
+//! With `e = -B theta + noise`, noise of covariance `V = blockdiag(V_k)` that is new at every station and a Gaussian
+//! prior on `theta`, minus the logarithm of the marginal likelihood is, up to a constant,
+//!
+//! ```text
+//! 1/2 ( ln|V| + ln|prior^-1| + ln|H| + e' V^-1 e + mean' prior mean - b' H^-1 b ),   H = prior + B' V^-1 B
+//! ```
+//!
+//! (Harville 1977). Its slope in a level with `dV` is `1/2 (tr(P dV) - y' P dV P y)`; its curvature is taken as that of
+//! the average of observed and expected information (Gilmour, Thompson and Cullis 1995).
+
+#![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
+
+use nalgebra::{DMatrix, DVector};
+
+use super::components::Component;
+use super::levels::Level;
+use super::linearisation::Linearisation;
+use crate::positive::Factor;
+use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
+
+/// What a component does, and the levels whose product is its deviation.
+#[derive(Clone, Debug)]
+pub(super) struct Term {
+    /// Its component's levels that are multiplied.
+    pub levels: Vec<usize>,
+    /// What it does.
+    pub effect: Effect,
+}
+
+/// What a component does at a deviation of one.
+#[derive(Clone, Debug)]
+pub(super) enum Effect {
+    /// New at every station: roots of its covariance, one per station.
+    Noise(Vec<DMatrix<f64>>),
+    /// The same at all stations: columns of new parameters, one matrix per station.
+    Constant(Vec<DMatrix<f64>>),
+    /// As `Constant`, but what all stations share of it cannot be told from the poses and comes again whenever the arm
+    /// works: the answer is given as if it were new at every station, and its covariance is as it is.
+    Recurring(Vec<DMatrix<f64>>),
+    /// A prior on parameters that are there already.
+    Prior {
+        /// First of them.
+        first: usize,
+        /// Information at a deviation of one.
+        information: DMatrix<f64>,
+        /// Mean.
+        mean: DVector<f64>,
+    },
+}
+
+/// A prior on parameters.
+struct Prior {
+    levels: Vec<usize>,
+    first: usize,
+    count: usize,
+    /// `None`: the identity.
+    information: Option<DMatrix<f64>>,
+    mean: Option<DVector<f64>>,
+    recurring: bool,
+}
+
+impl Prior {
+    fn range(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.count
+    }
+
+    /// Information times a vector.
+    fn times(&self, v: &[f64]) -> Vec<f64> {
+        match &self.information {
+            None => v.to_vec(),
+            Some(m) => (m * DVector::from_column_slice(v)).as_slice().to_vec(),
+        }
+    }
+}
+
+struct Noise {
+    levels: Vec<usize>,
+    roots: Vec<DMatrix<f64>>,
+}
+
+/// Rows of a station, as the kernels want them.
+struct Station {
+    size: usize,
+    /// `[B e]` row by row, padded to whole vectors.
+    rows: Vec<f64>,
+    pixels: DMatrix<f64>,
+}
+
+/// A cell linearised, with its components.
+pub(super) struct Mixed {
+    pub levels: Vec<Level>,
+    /// Parameters of the answer: poses, cameras, boards, and constants of the arm.
+    pub size: usize,
+    /// Those of them before the recurring ones.
+    pub told: usize,
+    /// Names of the components, with the range of their constants.
+    pub constants: Vec<(&'static str, std::ops::Range<usize>)>,
+    width: usize,
+    stations: Vec<Station>,
+    noises: Vec<Noise>,
+    priors: Vec<Prior>,
+    given: DMatrix<f64>,
+    given_right: DVector<f64>,
+    unit: VectorUnit,
+}
+
+/// How much of [`Mixed::evaluate`] is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// The penalised likelihood alone.
+    Value,
+    /// Its slope and curvature too.
+    Slope,
+    /// The answer instead of slopes.
+    Answer,
+}
+
+/// The model at given levels.
+pub(super) struct Evaluation {
+    /// Minus the logarithm of the posterior density of the levels.
+    pub value: f64,
+    /// Its slope in the logarithms of the levels.
+    pub slope: DVector<f64>,
+    /// Its curvature.
+    pub curvature: DMatrix<f64>,
+    /// The parameters.
+    pub theta: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Mixed {
+    /// A linearised cell with its components; `weak` is information and right side of what is believed of the poses.
+    pub fn new(
+        linearisation: &Linearisation,
+        components: &[Box<dyn Component + '_>],
+        weak: (&DMatrix<f64>, &DVector<f64>),
+        cell: &super::cell::Cell,
+    ) -> Self {
+        let mut levels = Vec::new();
+        let (mut noises, mut priors, mut constants) = (Vec::new(), Vec::new(), Vec::new());
+        let mut blocks: Vec<(bool, &'static str, Vec<usize>, Vec<DMatrix<f64>>)> = Vec::new();
+        for component in components {
+            let first = levels.len();
+            levels.extend(component.levels());
+            for term in component.terms(cell, linearisation) {
+                let of: Vec<usize> = term.levels.iter().map(|l| first + l).collect();
+                match term.effect {
+                    Effect::Noise(roots) => noises.push(Noise { levels: of, roots }),
+                    Effect::Constant(columns) => blocks.push((false, component.name(), of, columns)),
+                    Effect::Recurring(columns) => blocks.push((true, component.name(), of, columns)),
+                    Effect::Prior { first, information, mean } => priors.push(Prior {
+                        levels: of,
+                        first,
+                        count: mean.len(),
+                        information: Some(information),
+                        mean: Some(mean),
+                        recurring: false,
+                    }),
+                }
+            }
+        }
+        // Recurring parameters come last: the answer does not name them.
+        blocks.sort_by_key(|(recurring, ..)| *recurring);
+        let poses = linearisation.information.nrows();
+        let mut size = poses;
+        let mut told = poses;
+        for (recurring, name, of, columns) in &blocks {
+            let count = columns.first().map_or(0, DMatrix::ncols);
+            priors.push(Prior {
+                levels: of.clone(),
+                first: size,
+                count,
+                information: None,
+                mean: None,
+                recurring: *recurring,
+            });
+            constants.push((*name, size..size + count));
+            size += count;
+            if !recurring {
+                told = size;
+            }
+        }
+        let width = (size + 1).next_multiple_of(MAX_LANES);
+        let stations = linearisation
+            .stations
+            .iter()
+            .enumerate()
+            .map(|(k, from)| {
+                let rows_of = from.e.len();
+                let mut rows = vec![0.0; rows_of * width];
+                for (r, row) in rows.chunks_exact_mut(width).enumerate() {
+                    for (j, entry) in row[..poses].iter_mut().enumerate() {
+                        *entry = from.b[(r, j)];
+                    }
+                    let mut at = poses;
+                    for (_, _, _, columns) in &blocks {
+                        for j in 0..columns[k].ncols() {
+                            row[at] = columns[k][(r, j)];
+                            at += 1;
+                        }
+                    }
+                    row[size] = from.e[r];
+                }
+                Station { size: rows_of, rows, pixels: from.pixels.clone() }
+            })
+            .collect();
+        let mut given = DMatrix::zeros(size, size);
+        let mut given_right = DVector::zeros(size);
+        given.view_mut((0, 0), (poses, poses)).copy_from(&(&linearisation.information + weak.0));
+        given_right.rows_mut(0, poses).copy_from(&(&linearisation.gradient + weak.1));
+        Self {
+            levels,
+            size,
+            told,
+            constants,
+            width,
+            stations,
+            noises,
+            priors,
+            given,
+            given_right,
+            unit: VectorUnit::widest(),
+        }
+    }
+
+    /// Logarithms of the levels to begin with.
+    pub fn start(&self) -> DVector<f64> {
+        DVector::from_iterator(self.levels.len(), self.levels.iter().map(|l| l.start.ln()))
+    }
+
+    fn deviation(levels: &[usize], t: &DVector<f64>) -> f64 {
+        levels.iter().map(|l| t[*l]).sum::<f64>().exp()
+    }
+
+    /// The model at levels `exp(t)`; `None` where it is singular or not finite.
+    pub fn evaluate(&self, t: &DVector<f64>, wanted: Wanted) -> Option<Evaluation> {
+        let n = self.size;
+        let noise: Vec<f64> = self.noises.iter().map(|x| Self::deviation(&x.levels, t)).collect();
+        let prior: Vec<f64> = self.priors.iter().map(|x| Self::deviation(&x.levels, t)).collect();
+        let mut sum = vec![0.0; (n + 1) * self.width];
+        let mut constant = 0.0;
+        let mut whitened: Vec<(DMatrix<f64>, Vec<f64>)> = Vec::with_capacity(self.stations.len());
+        for (k, station) in self.stations.iter().enumerate() {
+            let (factor, log_determinant) = self.factor(station, k, &noise, None)?;
+            let mut rows = station.rows.clone();
+            dispatch(self.unit, Whiten { factor: &factor, rows: &mut rows, width: self.width });
+            constant += log_determinant;
+            whitened.push((factor, rows));
+        }
+        for (_, rows) in &whitened {
+            dispatch(self.unit, Accumulate { rows, width: self.width, size: n + 1, sum: &mut sum });
+        }
+        let entry = |i: usize, j: usize| sum[i.min(j) * self.width + i.max(j)];
+        constant += entry(n, n);
+        let mut information = self.given.clone();
+        let mut right = self.given_right.clone();
+        for i in 0..n {
+            right[i] -= entry(i, n);
+            for j in i..n {
+                let value = entry(i, j);
+                information[(i, j)] += value;
+                if i != j {
+                    information[(j, i)] += value;
+                }
+            }
+        }
+        for (p, s) in self.priors.iter().zip(&prior) {
+            constant += self.add_prior(p, *s, &mut information, &mut right);
+        }
+        let factor = Factor::new(&information)?;
+        let theta = DVector::from_vec(factor.solve(right.as_slice()));
+        constant += factor.log_determinant() - right.dot(&theta);
+        let mut value = 0.5 * constant;
+        let count = self.levels.len();
+        let mut slope = DVector::zeros(count);
+        let mut curvature = DMatrix::zeros(count, count);
+        for (i, (level, t)) in self.levels.iter().zip(t.iter()).enumerate() {
+            let (penalty, first, second) = level.penalty(*t);
+            value += penalty;
+            slope[i] = first;
+            curvature[(i, i)] = second;
+        }
+        if !value.is_finite() {
+            return None;
+        }
+        let covariance = match wanted {
+            Wanted::Value => DMatrix::zeros(0, 0),
+            _ => factor.inverse(),
+        };
+        let mut evaluation = Evaluation { value, slope, curvature, theta, covariance };
+        match wanted {
+            Wanted::Value => {}
+            Wanted::Slope => self.differentiate(&whitened, &noise, &prior, &mut evaluation),
+            Wanted::Answer if self.told < n => self.answer_apart(&noise, &prior, &mut evaluation)?,
+            Wanted::Answer => {}
+        }
+        Some(evaluation)
+    }
+
+    /// Adds a prior at deviation `s`; what it adds to twice the value.
+    fn add_prior(
+        &self,
+        p: &Prior,
+        s: f64,
+        information: &mut DMatrix<f64>,
+        right: &mut DVector<f64>,
+    ) -> f64 {
+        let weight = s.powi(-2);
+        let mut constant = 2.0 * p.count as f64 * s.ln();
+        match &p.information {
+            None => {
+                for i in p.range() {
+                    information[(i, i)] += weight;
+                }
+            }
+            Some(m) => {
+                let mut view = information.view_mut((p.first, p.first), (p.count, p.count));
+                view += m * weight;
+            }
+        }
+        if let Some(mean) = &p.mean {
+            let pull = DVector::from_vec(p.times(mean.as_slice())) * weight;
+            constant += pull.dot(mean);
+            let mut view = right.rows_mut(p.first, p.count);
+            view += pull;
+        }
+        constant
+    }
+
+    /// Cholesky factor of a station's covariance, and the logarithm of its determinant. With `prior`, recurring errors
+    /// count as new at the station.
+    fn factor(
+        &self,
+        station: &Station,
+        k: usize,
+        noise: &[f64],
+        prior: Option<&[f64]>,
+    ) -> Option<(DMatrix<f64>, f64)> {
+        let mut covariance = station.pixels.clone();
+        for (x, s) in self.noises.iter().zip(noise) {
+            let root = &x.roots[k];
+            covariance.gemm(s * s, root, &root.transpose(), 1.0);
+        }
+        if let Some(prior) = prior {
+            for (p, s) in self.priors.iter().zip(prior).filter(|(p, _)| p.recurring) {
+                let columns = station.columns(p, self.width);
+                covariance.gemm(s * s, &columns, &columns.transpose(), 1.0);
+            }
+        }
+        let factor = covariance.cholesky()?.unpack();
+        let log_determinant = 2.0 * factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        Some((factor, log_determinant))
+    }
+
+    /// Slope and curvature.
+    fn differentiate(
+        &self,
+        whitened: &[(DMatrix<f64>, Vec<f64>)],
+        noise: &[f64],
+        prior: &[f64],
+        evaluation: &mut Evaluation,
+    ) {
+        let n = self.size;
+        let Evaluation { slope, curvature, theta, covariance, .. } = evaluation;
+        let terms = self.noises.len() + self.priors.len();
+        // dV P y of each term, whitened, and B' V^-1 of it.
+        let mut pulled = vec![vec![0.0; n]; terms];
+        let mut products = DMatrix::<f64>::zeros(terms, terms);
+        let mut slopes = vec![0.0; terms];
+        // Deviations of the parameters from their priors.
+        let deviations: Vec<Vec<f64>> = self
+            .priors
+            .iter()
+            .map(|p| {
+                let mut u = theta.as_slice()[p.range()].to_vec();
+                if let Some(mean) = &p.mean {
+                    u.iter_mut().zip(mean.iter()).for_each(|(u, m)| *u -= m);
+                }
+                u
+            })
+            .collect();
+        for (k, (factor, rows)) in whitened.iter().enumerate() {
+            let size = self.stations[k].size;
+            let b = DMatrix::from_row_slice(size, self.width, rows);
+            let bs = DMatrix::from_vec(size, n, product_with(self.unit, rows, self.width, size, covariance));
+            let b_of = b.columns(0, n);
+            let spread = &bs * b_of.transpose();
+            // Whitened P y.
+            let q = b.column(n) + b_of * &*theta;
+            let mut acts: Vec<DVector<f64>> = Vec::with_capacity(terms);
+            for (j, (x, s)) in self.noises.iter().zip(noise).enumerate() {
+                let mut root = x.roots[k].clone();
+                factor.solve_lower_triangular_mut(&mut root);
+                let along = root.tr_mul(&q);
+                let trace = root.norm_squared() - (&spread * &root).dot(&root);
+                slopes[j] += s * s * (trace - along.norm_squared());
+                acts.push(&root * along * (2.0 * s * s));
+            }
+            for (p, u) in self.priors.iter().zip(&deviations) {
+                acts.push(b_of.columns(p.first, p.count) * DVector::from_column_slice(u) * -2.0);
+            }
+            for i in 0..terms {
+                for j in 0..=i {
+                    products[(i, j)] += acts[i].dot(&acts[j]);
+                }
+                let onto = b_of.tr_mul(&acts[i]);
+                pulled[i].iter_mut().zip(onto.iter()).for_each(|(a, b)| *a += b);
+            }
+        }
+        for (i, (p, s)) in self.priors.iter().zip(prior).enumerate() {
+            let weight = s.powi(-2);
+            let u = &deviations[i];
+            let mu = p.times(u);
+            let block = covariance.view((p.first, p.first), (p.count, p.count));
+            let trace = match &p.information {
+                None => block.trace(),
+                Some(m) => m.dot(&block),
+            };
+            let squared: f64 = u.iter().zip(&mu).map(|(a, b)| a * b).sum();
+            let at = self.noises.len() + i;
+            slopes[at] += p.count as f64 - weight * (trace + squared);
+            // What the pixels say of these parameters counts as observations too.
+            for (j, other) in self.priors.iter().enumerate().take(i + 1) {
+                let between = self.given.view((p.first, other.first), (p.count, other.count));
+                let v = DVector::from_column_slice(&deviations[j]);
+                let product = 4.0 * DVector::from_column_slice(u).dot(&(between * v));
+                products[(at, self.noises.len() + j)] += product;
+            }
+            let onto = self.given.columns(p.first, p.count) * DVector::from_column_slice(u) * -2.0;
+            pulled[at].iter_mut().zip(onto.iter()).for_each(|(a, b)| *a += b);
+        }
+        let pulled: Vec<DVector<f64>> = pulled.into_iter().map(DVector::from_vec).collect();
+        let solved: Vec<DVector<f64>> = pulled.iter().map(|v| &*covariance * v).collect();
+        let of = |i: usize| -> &[usize] {
+            if i < self.noises.len() {
+                &self.noises[i].levels
+            } else {
+                &self.priors[i - self.noises.len()].levels
+            }
+        };
+        for i in 0..terms {
+            for l in of(i) {
+                slope[*l] += slopes[i];
+                // d2V = 2 dV, of which the average information knows nothing.
+                for m in of(i) {
+                    curvature[(*l, *m)] += 2.0 * slopes[i];
+                }
+            }
+            for j in 0..=i {
+                let entry = 0.5 * (products[(i, j)] - pulled[i].dot(&solved[j]));
+                for l in of(i) {
+                    for m in of(j) {
+                        curvature[(*l, *m)] += entry;
+                        if i != j {
+                            curvature[(*m, *l)] += entry;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The answer as if recurring errors were new at every station, with its covariance under the model as it is: the
+    /// sandwich of a working model (Huber 1967, White 1980).
+    fn answer_apart(&self, noise: &[f64], prior: &[f64], evaluation: &mut Evaluation) -> Option<()> {
+        let p = self.told;
+        let mut information = self.given.view((0, 0), (p, p)).into_owned();
+        let mut right = self.given_right.rows(0, p).into_owned();
+        for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| !q.recurring) {
+            self.add_prior(q, *s, &mut information, &mut right);
+        }
+        let recurring = self.size - p;
+        let mut scales = vec![0.0; recurring];
+        for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| q.recurring) {
+            scales[q.first - p..q.first - p + q.count].fill(*s);
+        }
+        let mut shared = DMatrix::zeros(p, recurring);
+        let mut own = DMatrix::zeros(p, p);
+        for (k, station) in self.stations.iter().enumerate() {
+            let (factor, _) = self.factor(station, k, noise, Some(prior))?;
+            let mut rows = station.rows.clone();
+            dispatch(self.unit, Whiten { factor: &factor, rows: &mut rows, width: self.width });
+            let all = DMatrix::from_row_slice(station.size, self.width, &rows);
+            let b = all.columns(0, p);
+            let mut z = all.columns(p, recurring).into_owned();
+            for (mut column, s) in z.column_iter_mut().zip(&scales) {
+                column *= *s;
+            }
+            information.gemm_tr(1.0, &b.into_owned(), &b.into_owned(), 1.0);
+            right -= b.tr_mul(&all.column(self.size));
+            let here = b.tr_mul(&z);
+            own.gemm(1.0, &here, &here.transpose(), 1.0);
+            shared += here;
+        }
+        let bread = Factor::new(&information)?.inverse();
+        let theta = &bread * right;
+        let meat = &shared * shared.transpose() - own;
+        evaluation.covariance = &bread + &bread * meat * &bread;
+        evaluation.theta = theta;
+        Some(())
+    }
+}
+
+impl Station {
+    /// Columns of a prior's parameters.
+    fn columns(&self, p: &Prior, width: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(self.size, p.count, |i, j| self.rows[i * width + p.first + j])
+    }
+}
+
+/// `L^-1` times rows, in place.
+struct Whiten<'a> {
+    factor: &'a DMatrix<f64>,
+    rows: &'a mut [f64],
+    width: usize,
+}
+
+impl Kernel for Whiten<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let size = self.factor.nrows();
+        for i in 0..size {
+            let (done, rest) = self.rows.split_at_mut(i * self.width);
+            let row = &mut rest[..self.width];
+            let inverse = simd.splat(1.0 / self.factor[(i, i)]);
+            for at in (0..self.width).step_by(S::LANES) {
+                let mut value = simd.load(&row[at..]);
+                for j in 0..i {
+                    let factor = simd.splat(self.factor[(i, j)]);
+                    value = factor.neg_mul_add(simd.load(&done[j * self.width + at..]), value);
+                }
+                (value * inverse).store(&mut row[at..]);
+            }
+        }
+    }
+}
+
+/// Adds the products of all pairs of columns: whole vectors of the upper triangle, row by row.
+struct Accumulate<'a> {
+    rows: &'a [f64],
+    width: usize,
+    size: usize,
+    sum: &'a mut [f64],
+}
+
+impl Kernel for Accumulate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        for i in 0..self.size {
+            let first = i / S::LANES * S::LANES;
+            for at in (first..self.width).step_by(S::LANES) {
+                let mut total = simd.load(&self.sum[i * self.width + at..]);
+                for row in self.rows.chunks_exact(self.width) {
+                    total = simd.splat(row[i]).mul_add(simd.load(&row[at..]), total);
+                }
+                total.store(&mut self.sum[i * self.width + at..]);
+            }
+        }
+    }
+}
+
+/// Rows (of `width`, the first `n` entries) times a symmetric matrix, column by column.
+fn product_with(
+    unit: VectorUnit,
+    rows: &[f64],
+    width: usize,
+    size: usize,
+    matrix: &DMatrix<f64>,
+) -> Vec<f64> {
+    let mut out = vec![0.0; size * matrix.ncols()];
+    dispatch(unit, Product { rows, width, size, matrix, out: &mut out });
+    out
+}
+
+struct Product<'a> {
+    rows: &'a [f64],
+    width: usize,
+    size: usize,
+    matrix: &'a DMatrix<f64>,
+    out: &'a mut [f64],
+}
+
+impl Kernel for Product<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let n = self.matrix.ncols();
+        let whole = n / S::LANES * S::LANES;
+        for (j, column) in self.matrix.as_slice().chunks_exact(n).enumerate() {
+            for (r, row) in self.rows.chunks_exact(self.width).enumerate() {
+                let mut total = simd.splat(0.0);
+                for at in (0..whole).step_by(S::LANES) {
+                    total = simd.load(&row[at..]).mul_add(simd.load(&column[at..]), total);
+                }
+                let mut value = total.sum();
+                for at in whole..n {
+                    value += row[at] * column[at];
+                }
+                self.out[j * self.size + r] = value;
+            }
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Everything that is wrong in a cell at once: one linear mixed model, its levels found and integrated out.
+//!
+//! A [`Cell`] is stations (stops of the arm), cameras and targets. Each detection is a [`PoseMeasurement`]: the pose of
+//! a target in a camera with its covariance and its dependence on the camera's parameters; pixels are read once. Around
+//! a guess of all unknowns the twist between chain and measurement is linear in what is constant (poses, camera, joint
+//! offsets, links, board: parameters with a prior) and in what is new at every station (noise). Each [`Component`] of
+//! the error is one file; how large it is, its level, is found by restricted likelihood, and the answer is averaged over
+//! what the levels may be.
+//!
+//! Sources: Patterson and Thompson 1971 and Harville 1977 (restricted likelihood), Gilmour, Thompson and Cullis 1995
+//! (average information), Rue, Martino and Chopin 2009 (nested Laplace), Huber 1967 and White 1980 (sandwich).
+
+mod cell;
+mod cell_start;
+mod components;
+mod descent;
+mod levels;
+mod linearisation;
+mod mixed;
+mod nodes;
+mod pose_measurement;
+mod posterior;
+mod start;
+mod systems;
+pub mod tuning;
+mod twists;
+
+pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station};
+pub use cell_start::{CellStart, start_of_cell};
+pub use components::Assumptions;
+pub use levels::{Level, LevelPrior};
+pub use pose_measurement::{PoseMeasurement, compress, shrunk_variances};
+pub use posterior::{Node, Options, Posterior, estimate};
+pub use start::{ChainStart, WeakPrior, start_from_poses};

@@ -1,0 +1,103 @@
+//! One view as a pose: what its image says of `T_camera_target`, and how that depends on the camera.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
+
+use crate::camera::Camera;
+use crate::error::Error;
+use crate::least_squares::{PixelParameters, Problem, view_block};
+use crate::se3::Se3;
+
+/// A view reduced to the pose that fits its image best.
+///
+/// With free camera parameters the pose is `exp(-sensitivity dc) pose`, and the residual it leaves still says
+/// something of `dc`: information `camera_information` and gradient `camera_gradient`, at a pixel noise of 1 px.
+#[derive(Clone, Debug)]
+pub struct PoseMeasurement {
+    /// `A` of the chain.
+    pub motion: Se3,
+    /// `T_camera_target` of the image alone.
+    pub pose: Se3,
+    /// Covariance of the pose's left perturbation at 1 px.
+    pub covariance: Matrix6<f64>,
+    /// Derivative of the pose's twist in the camera parameters, negated: `6 x n_c`.
+    pub sensitivity: Matrix6xX<f64>,
+    /// Information about the camera parameters that the pose does not absorb, at 1 px: `n_c x n_c`.
+    pub camera_information: DMatrix<f64>,
+    /// Its gradient `C' (u - pi)`, at 1 px.
+    pub camera_gradient: DVector<f64>,
+    /// Variance of the pixels estimated from the residual, px^2.
+    pub variance_px2: f64,
+    /// Degrees of freedom behind that variance.
+    pub degrees_of_freedom: f64,
+}
+
+/// Compresses a view at the pose that fits its image.
+///
+/// # Errors
+/// [`Error::Numerical`] if a point is out of sight at the pose, [`Error::Degenerate`] if its points determine none.
+pub fn compress(
+    problem: &Problem,
+    k: usize,
+    camera: &Camera,
+    pose: &Se3,
+    parameters: Option<&PixelParameters>,
+<<<<<<< HEAD:crates/handeye-core/src/estimation/pose_measurement.rs
+) -> Result<PoseMeasurement, Error> {
+    let block =
+        view_block(problem, k, camera, 0.0, pose, 1.0, parameters, Loss::Squared).ok_or_else(|| {
+            Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
+        })?;
+=======
+) -> Result<CompressedView, Error> {
+    let block = view_block(problem, k, camera, pose, 1.0, parameters).ok_or_else(|| {
+        Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
+    })?;
+>>>>>>> house:crates/handeye-core/src/evidence/compressed.rs
+    let covariance = block
+        .m
+        .cholesky()
+        .ok_or_else(|| Error::degenerate(format!("view {k}: its points do not determine the target's pose")))?
+        .inverse();
+    let (sensitivity, camera_information, camera_gradient) = match &block.columns {
+        None => (Matrix6xX::zeros(0), DMatrix::zeros(0, 0), DVector::zeros(0)),
+        Some(c) => {
+            let sensitivity = covariance * &c.mc;
+            let information = &c.cc - c.mc.tr_mul(&sensitivity);
+            // The gradient of the cost in the parameters at the best pose, as a step towards less cost.
+            let gradient = -(&c.gc - sensitivity.tr_mul(&block.g));
+            (sensitivity, information, gradient)
+        }
+    };
+    let degrees_of_freedom = (2 * problem.point_count(k)) as f64 - 6.0;
+    Ok(PoseMeasurement {
+        motion: *problem.motion(k),
+        pose: *pose,
+        covariance,
+        sensitivity,
+        camera_information,
+        camera_gradient,
+        variance_px2: block.squared_px / degrees_of_freedom.max(1.0),
+        degrees_of_freedom,
+    })
+}
+
+/// Pixel variance of each view, shrunk towards the median of all with `prior_degrees` of freedom.
+///
+/// Corner noise differs severalfold between views (small, oblique, cluttered); a view's own residual says by how
+/// much, and the others keep a view with few points from fooling itself. Never below `floor_px2`.
+pub fn shrunk_variances(views: &[&PoseMeasurement], prior_degrees: f64, floor_px2: f64) -> Vec<f64> {
+    let mut sorted: Vec<f64> = views.iter().map(|v| v.variance_px2).collect();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    if n == 0 {
+        return Vec::new();
+    }
+    let median = 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]);
+    views
+        .iter()
+        .map(|v| {
+            let degrees = v.degrees_of_freedom.max(0.0);
+            ((degrees * v.variance_px2 + prior_degrees * median) / (degrees + prior_degrees)).max(floor_px2)
+        })
+        .collect()
+}

@@ -1,0 +1,292 @@
+//! From a cell to the answer: linearise, find the levels, move, and average over what the levels may be.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::cell::Cell;
+use super::components::{self, Assumptions, Component};
+use super::linearisation::{Guess, linearise};
+use super::mixed::{Evaluation, Mixed, Wanted};
+use super::nodes;
+use super::start::WeakPrior;
+use crate::error::Error;
+use crate::se3::Se3;
+
+/// How an estimate is made.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// What is assumed of the cell.
+    pub assumptions: Assumptions,
+    /// What is believed of the poses beforehand.
+    pub weak: WeakPrior,
+    /// Pairs of nodes that the answer is averaged over.
+    pub pairs: usize,
+    /// Most linearisations.
+    pub most_rounds: usize,
+}
+
+/// The model at one set of levels.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// Its share.
+    pub weight: f64,
+    /// The levels, in the order of [`Posterior::level_names`].
+    pub levels: Vec<f64>,
+    /// Parameters there, relative to the point of linearisation.
+    pub theta: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+}
+
+/// What is believed after the measurements.
+#[derive(Clone, Debug)]
+pub struct Posterior {
+    /// `X` of each camera.
+    pub x: Vec<Se3>,
+    /// `Y` of each target.
+    pub y: Vec<Se3>,
+    /// All parameters: twists of `X` and `Y` (zero), cameras, boards, constants of the arm.
+    pub theta: DVector<f64>,
+    /// Their covariance, averaged.
+    pub covariance: DMatrix<f64>,
+    /// Components with constants, and where theirs stand in `theta`.
+    pub constants: Vec<(&'static str, std::ops::Range<usize>)>,
+    /// Names of the levels.
+    pub level_names: Vec<&'static str>,
+    /// The model at the mode of the levels, first, and around it.
+    pub nodes: Vec<Node>,
+    /// Degrees of freedom of the covariance of each `X`.
+    pub degrees_of_freedom: Vec<f64>,
+    /// Minus the logarithm of the posterior density of the levels at their mode.
+    pub value: f64,
+    /// Linearisations.
+    pub rounds: usize,
+    /// Steps of the levels in all rounds.
+    pub steps: usize,
+    /// Whether poses and levels came to rest.
+    pub converged: bool,
+}
+
+/// A step of the poses below this share of its standard deviation is the last.
+const AT_REST: f64 = 1e-2;
+/// Steps of the levels in one round.
+const MOST_STEPS: usize = 30;
+/// A step that lowers the penalised likelihood by less is the last.
+const FLAT: f64 = 1e-3;
+/// Longest step of a level, in its logarithm.
+const LONGEST_STEP: f64 = 1.5;
+
+/// Estimates a cell from a guess of its poses.
+///
+/// # Errors
+/// [`Error::InvalidInput`] for a cell that does not fit together, [`Error::Numerical`] where the model is singular.
+pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> Result<Posterior, Error> {
+    cell.check()?;
+    let components = components::all(cell, &options.assumptions)?;
+    let mut guess = Guess { x: start.0, y: start.1 };
+    let mut levels: Option<DVector<f64>> = None;
+    let (mut steps, mut rounds, mut converged) = (0, 0, false);
+    let mut mixed = assemble(cell, &guess, &components, &options.weak);
+    let mut mode = None;
+    while rounds < options.most_rounds {
+        rounds += 1;
+        let found = find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()))?;
+        steps += found.steps;
+        let answer = answer_at(&mixed, &found.t)?;
+        let moved = largest_share(&answer, 6 * (cell.cameras.len() + cell.targets.len()));
+        levels = Some(found.t.clone());
+        let rest = moved < AT_REST;
+        mode = Some(found);
+        if rest {
+            converged = true;
+            break;
+        }
+        guess = guess.moved(answer.theta.as_slice());
+        mixed = assemble(cell, &guess, &components, &options.weak);
+        mode = None;
+    }
+    let found = match mode {
+        Some(found) => found,
+        None => find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()))?,
+    };
+    let (nodes, value) = average(&mixed, &found, options.pairs)?;
+    Ok(gather(cell, &guess, &mixed, nodes, value, (rounds, steps, converged && found.at_rest)))
+}
+
+fn assemble(cell: &Cell, guess: &Guess, components: &[Box<dyn Component>], weak: &WeakPrior) -> Mixed {
+    let linearisation = linearise(cell, guess);
+    let end = cell.columns().end;
+    let mut information = DMatrix::zeros(end, end);
+    let mut right = DVector::zeros(end);
+    for (c, x) in guess.x.iter().enumerate() {
+        let (of_x, pull) = weak.of_x(x);
+        information.view_mut((6 * c, 6 * c), (6, 6)).copy_from(&of_x);
+        right.rows_mut(6 * c, 6).copy_from(&pull);
+    }
+    for t in 0..guess.y.len() {
+        let at = 6 * (guess.x.len() + t);
+        information.view_mut((at, at), (6, 6)).copy_from(&weak.of_y());
+    }
+    Mixed::new(&linearisation, components, (&information, &right), cell)
+}
+
+fn singular() -> Error {
+    Error::numerical("the model of the measurements is singular")
+}
+
+fn answer_at(mixed: &Mixed, t: &DVector<f64>) -> Result<Evaluation, Error> {
+    mixed.evaluate(t, Wanted::Answer).ok_or_else(singular)
+}
+
+/// Largest step of the poses, in standard deviations.
+fn largest_share(answer: &Evaluation, poses: usize) -> f64 {
+    (0..poses)
+        .map(|i| answer.theta[i].abs() / answer.covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt())
+        .fold(0.0, f64::max)
+}
+
+struct Mode {
+    t: DVector<f64>,
+    value: f64,
+    curvature: DMatrix<f64>,
+    steps: usize,
+    at_rest: bool,
+}
+
+/// Newton's method on the levels, damped until the penalised likelihood falls.
+fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Error> {
+    let mut t = start;
+    let mut now = mixed.evaluate(&t, Wanted::Slope).ok_or_else(singular)?;
+    let mut damping = 1e-2;
+    let mut at_rest = false;
+    let mut steps = 0;
+    while steps < MOST_STEPS && !at_rest {
+        steps += 1;
+        let mut taken = false;
+        for _ in 0..8 {
+            let step = damped_step(&now, damping);
+            let promised = -0.5 * step.dot(&now.slope);
+            if promised < FLAT * 0.1 {
+                at_rest = true;
+                break;
+            }
+            let there = &t + &step;
+            match mixed.evaluate(&there, Wanted::Slope) {
+                Some(next) if next.value < now.value => {
+                    at_rest = now.value - next.value < FLAT;
+                    t = there;
+                    now = next;
+                    damping = (damping * 0.2).max(1e-4);
+                    taken = true;
+                    break;
+                }
+                _ => damping = (damping * 10.0).max(1e-1),
+            }
+        }
+        if !taken {
+            at_rest = true;
+        }
+    }
+    Ok(Mode { t, value: now.value, curvature: now.curvature, steps, at_rest })
+}
+
+/// Step of the levels by a curvature made positive.
+fn damped_step(now: &Evaluation, damping: f64) -> DVector<f64> {
+    let eigen = nalgebra::SymmetricEigen::new(now.curvature.clone());
+    let along = eigen.eigenvectors.tr_mul(&now.slope);
+    let scaled = DVector::from_fn(along.len(), |i, _| {
+        -along[i] / (eigen.eigenvalues[i].abs().max(0.05) + damping)
+    });
+    let mut step = &eigen.eigenvectors * scaled;
+    let longest = step.amax();
+    if longest > LONGEST_STEP {
+        step *= LONGEST_STEP / longest;
+    }
+    step
+}
+
+/// The nodes with their shares, and the penalised likelihood at the mode.
+fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<(Vec<Node>, f64), Error> {
+    let mut nodes = Vec::new();
+    let mut logs = Vec::new();
+    for (t, density) in nodes::around(&mode.t, &mode.curvature, pairs) {
+        // Levels at which the model is singular have no share.
+        let Some(answer) = mixed.evaluate(&t, Wanted::Answer) else { continue };
+        logs.push(mode.value - answer.value - density);
+        nodes.push(Node {
+            weight: 0.0,
+            levels: t.iter().map(|t| t.exp()).collect(),
+            theta: answer.theta.rows(0, mixed.told).into_owned(),
+            covariance: answer.covariance.view((0, 0), (mixed.told, mixed.told)).into_owned(),
+        });
+    }
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !most.is_finite() {
+        return Err(singular());
+    }
+    let total: f64 = logs.iter().map(|l| (l - most).exp()).sum();
+    for (node, log) in nodes.iter_mut().zip(&logs) {
+        node.weight = (log - most).exp() / total;
+    }
+    Ok((nodes, mode.value))
+}
+
+/// Fewest degrees of freedom: below, regions would have no useful quantile.
+const FEWEST_DEGREES_OF_FREEDOM: f64 = 4.5;
+
+fn gather(
+    cell: &Cell,
+    guess: &Guess,
+    mixed: &Mixed,
+    nodes: Vec<Node>,
+    value: f64,
+    (rounds, steps, converged): (usize, usize, bool),
+) -> Posterior {
+    let told = mixed.told;
+    let mut theta = DVector::zeros(told);
+    for node in &nodes {
+        theta.axpy(node.weight, &node.theta, 1.0);
+    }
+    let mut covariance = DMatrix::zeros(told, told);
+    for node in &nodes {
+        let away = &node.theta - &theta;
+        covariance += &node.covariance * node.weight;
+        covariance.ger(node.weight, &away, &away, 1.0);
+    }
+    covariance = (&covariance + covariance.transpose()) * 0.5;
+    let degrees_of_freedom = (0..cell.cameras.len()).map(|c| degrees_of_freedom(&nodes, 6 * c)).collect();
+    let moved = guess.moved(theta.as_slice());
+    let poses = 6 * (cell.cameras.len() + cell.targets.len());
+    theta.rows_mut(0, poses).fill(0.0);
+    Posterior {
+        x: moved.x,
+        y: moved.y,
+        theta,
+        covariance,
+        constants: mixed.constants.iter().filter(|(_, range)| range.end <= told).cloned().collect(),
+        level_names: mixed.levels.iter().map(|l| l.name).collect(),
+        nodes,
+        degrees_of_freedom,
+        value,
+        rounds,
+        steps,
+        converged,
+    }
+}
+
+/// Degrees of freedom of a covariance that is known only so well: a scaled chi-square whose logarithm spreads as the
+/// sizes of the nodes' covariances do.
+fn degrees_of_freedom(nodes: &[Node], first: usize) -> f64 {
+    let sizes: Vec<f64> = nodes
+        .iter()
+        .map(|node| {
+            let block = node.covariance.fixed_view::<6, 6>(first, first).into_owned();
+            // In standard deviations, as metres and radians differ by orders.
+            block.cholesky().map_or(f64::NAN, |f| f.l_dirty().diagonal().map(f64::ln).sum() / 3.0)
+        })
+        .collect();
+    let usable = || nodes.iter().zip(&sizes).filter(|(_, s)| s.is_finite());
+    let total: f64 = usable().map(|(n, _)| n.weight).sum();
+    let mean = usable().map(|(n, s)| n.weight * s).sum::<f64>() / total;
+    let variance = usable().map(|(n, s)| n.weight * (s - mean).powi(2)).sum::<f64>() / total;
+    (2.0 / variance.max(1e-12)).max(FEWEST_DEGREES_OF_FREEDOM)
+}

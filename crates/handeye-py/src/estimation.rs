@@ -1,0 +1,304 @@
+//! Pose measurements of a cell, and the posterior of everything in it.
+
+use handeye_core::estimation::{
+    Assumptions, Body, CameraPrior, Cell, Measurement, Options, PoseMeasurement, Posterior as CorePosterior,
+    SeenBy, Station, WeakPrior, compress, estimate, shrunk_variances, start_of_cell,
+};
+use handeye_core::least_squares::PixelParameters;
+use handeye_core::se3::Se3;
+use nalgebra::{DMatrix, DVector};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+
+use crate::convert::{self, Array};
+use crate::errors::{invalid, to_python};
+use crate::model::{jacobian_list, square};
+use crate::problem::Problem;
+
+/// Registers the classes and functions of this file.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PoseMeasurements>()?;
+    module.add_class::<Posterior>()?;
+    module.add_function(wrap_pyfunction!(set_tuning, module)?)?;
+    module.add_function(wrap_pyfunction!(estimate_cell, module)?)
+}
+#[pyfunction]
+fn set_tuning(v: Vec<f64>) { *handeye_core::estimation::tuning::T.write().unwrap() = v; }
+
+
+type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
+
+/// Views of one target through one camera, each as a pose with its covariance.
+#[pyclass(frozen, module = "handeye._core")]
+pub struct PoseMeasurements {
+    views: Vec<PoseMeasurement>,
+}
+
+#[pymethods]
+impl PoseMeasurements {
+    #[new]
+    #[pyo3(signature = (problem, poses, *, free_camera=None, board_scale=false))]
+    fn new<'py>(
+        py: Python<'py>,
+        problem: &Problem,
+        poses: Array<'py>,
+        free_camera: Option<Vec<usize>>,
+        board_scale: bool,
+    ) -> PyResult<Self> {
+        let poses = convert::transforms(py, "poses", &poses)?;
+        let count = problem.inner.view_count();
+        if poses.len() != count {
+            return Err(invalid(py, &format!("{} poses for {count} views", poses.len())));
+        }
+        let free = free_camera.unwrap_or_default();
+        let most = problem.inner.camera().lens.parameter_count();
+        if let Some(i) = free.iter().find(|i| **i >= most) {
+            return Err(invalid(py, &format!("camera parameter {i} of a lens with {most}")));
+        }
+        let columns = free.len() + usize::from(board_scale);
+        let parameters = (columns > 0).then(|| PixelParameters {
+            prior_information: DMatrix::zeros(columns, columns),
+            camera: free,
+            board_scale,
+        });
+        let views = py
+            .detach(|| {
+                poses
+                    .iter()
+                    .enumerate()
+                    .map(|(k, pose)| {
+                        compress(&problem.inner, k, problem.inner.camera(), pose, parameters.as_ref())
+                    })
+                    .collect::<Result<Vec<_>, _>>()
+            })
+            .map_err(|e| to_python(py, e))?;
+        Ok(Self { views })
+    }
+
+    fn __len__(&self) -> usize {
+        self.views.len()
+    }
+
+    /// Variance of the pixels of each view from its own residual, px^2.
+    #[getter]
+    fn variances_px2(&self) -> Vec<f64> {
+        self.views.iter().map(|v| v.variance_px2).collect()
+    }
+
+    /// Covariance (K, 6, 6) of each view's pose at 1 px.
+    #[getter]
+    fn covariances<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        convert::matrices_out(py, &self.views.iter().map(|v| v.covariance).collect::<Vec<_>>())
+    }
+
+    /// Pixel variance of each view, shrunk towards their median, px^2.
+    #[pyo3(signature = (*, prior_degrees, floor_px2))]
+    fn shrunk_variances(&self, prior_degrees: f64, floor_px2: f64) -> Vec<f64> {
+        shrunk_variances(&self.views.iter().collect::<Vec<_>>(), prior_degrees, floor_px2)
+    }
+}
+
+/// Whether it is on the flange, number of free parameters, and the prior: information, mean, whether it is inflated.
+type CameraGiven<'py> = (bool, usize, Option<(Array<'py>, Array<'py>, bool)>);
+/// Jacobians of joints and links per station, scales and free joints, and which ways of displacing are in metres.
+type ArmGiven<'py> = (Array<'py>, Array<'py>, Vec<f64>, Vec<usize>, Vec<bool>);
+/// Camera, target, measurements, and for each of these its station and pixel variance.
+type SeenGiven<'py> = (usize, usize, Bound<'py, PoseMeasurements>, Vec<usize>, Vec<f64>);
+
+fn body(on_flange: bool) -> Body {
+    if on_flange { Body::Flange } else { Body::Base }
+}
+
+/// The posterior of a cell; see the type stub.
+#[pyfunction]
+#[pyo3(signature = (
+    stations, cameras, targets, seen, *, arm=None, exact_robot=false, board_scale=false, start=None,
+    pairs, most_rounds,
+))]
+#[expect(clippy::too_many_arguments, reason = "one argument per part of a cell")]
+fn estimate_cell<'py>(
+    py: Python<'py>,
+    stations: Array<'py>,
+    cameras: Vec<CameraGiven<'py>>,
+    targets: Vec<bool>,
+    seen: Vec<SeenGiven<'py>>,
+    arm: Option<ArmGiven<'py>>,
+    exact_robot: bool,
+    board_scale: bool,
+    start: Option<(Array<'py>, Array<'py>)>,
+    pairs: usize,
+    most_rounds: usize,
+) -> PyResult<Posterior> {
+    let poses = convert::transforms(py, "stations", &stations)?;
+    let mut assumptions =
+        Assumptions { exact_robot, joint_scales: vec![], free_joints: vec![], link_lengths: vec![] };
+    let mut of_arm: Option<(Vec<DMatrix<f64>>, Vec<DMatrix<f64>>)> = None;
+    if let Some((joints, links, scales, free, lengths)) = arm {
+        let (joints, links) = (jacobian_list(py, &joints)?, jacobian_list(py, &links)?);
+        if joints.len() != poses.len() || links.len() != poses.len() {
+            return Err(invalid(py, "Jacobians of the arm must be as many as stations"));
+        }
+        (assumptions.joint_scales, assumptions.free_joints, assumptions.link_lengths) =
+            (scales, free, lengths);
+        of_arm = Some((joints, links));
+    }
+    let stations = poses
+        .iter()
+        .enumerate()
+        .map(|(k, pose)| Station {
+            pose: *pose,
+            joints: of_arm.as_ref().map(|(joints, _)| joints[k].clone()),
+            links: of_arm.as_ref().map(|(_, links)| links[k].clone()),
+        })
+        .collect();
+    let cameras = cameras
+        .into_iter()
+        .map(|(on_flange, parameters, prior)| {
+            let prior = prior
+                .map(|(information, mean, inflated)| {
+                    Ok::<_, PyErr>(CameraPrior {
+                        information: square(py, "camera prior", &information)?,
+                        mean: DVector::from_vec(convert::scalars(py, "camera mean", &mean)?),
+                        inflated,
+                    })
+                })
+                .transpose()?;
+            Ok(SeenBy { body: body(on_flange), parameters, prior })
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    let mut measurements = Vec::new();
+    for (camera, target, views, at, variances) in &seen {
+        let views = &views.get().views;
+        if at.len() != views.len() || variances.len() != views.len() {
+            return Err(invalid(py, "as many stations and variances as views are needed"));
+        }
+        for ((pose, station), variance_px2) in views.iter().zip(at).zip(variances) {
+            measurements.push(Measurement {
+                station: *station,
+                camera: *camera,
+                target: *target,
+                pose: pose.clone(),
+                variance_px2: *variance_px2,
+            });
+        }
+    }
+    measurements.sort_by_key(|m| m.station);
+    let cell = Cell {
+        stations,
+        cameras,
+        targets: targets.into_iter().map(body).collect(),
+        board_scale,
+        measurements,
+    };
+    let given = start
+        .map(|(x, y)| {
+            Ok::<_, PyErr>((
+                convert::transforms(py, "start X", &x)?,
+                convert::transforms(py, "start Y", &y)?,
+            ))
+        })
+        .transpose()?;
+    let options = Options { assumptions, weak: WeakPrior::default(), pairs, most_rounds };
+    let (inner, origin) = py
+        .detach(|| {
+            let given = given.as_ref().map(|(x, y)| (x.as_slice(), y.as_slice()));
+            let start = start_of_cell(&cell, &options.weak, given)?;
+            Ok((estimate(&cell, (start.x, start.y), &options)?, start.origin))
+        })
+        .map_err(|e| to_python(py, e))?;
+    Ok(Posterior { inner, origin })
+}
+
+/// What is believed of a cell.
+#[pyclass(frozen, module = "handeye._core")]
+pub struct Posterior {
+    inner: CorePosterior,
+    origin: &'static str,
+}
+
+fn transforms<'py>(py: Python<'py>, poses: &[Se3]) -> Floats<'py> {
+    convert::matrices_out(py, &poses.iter().map(Se3::to_matrix).collect::<Vec<_>>())
+}
+
+#[pymethods]
+impl Posterior {
+    /// `X` of each camera, (C, 4, 4).
+    #[getter]
+    fn x<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        transforms(py, &self.inner.x)
+    }
+
+    /// `Y` of each target, (T, 4, 4).
+    #[getter]
+    fn y<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        transforms(py, &self.inner.y)
+    }
+
+    /// All parameters (n,): twists (zero), cameras, boards, constants of the arm.
+    #[getter]
+    fn theta<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        convert::scalars_out(py, self.inner.theta.as_slice().to_vec())
+    }
+
+    /// Their covariance (n, n).
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        convert::dynamic_out(py, &self.inner.covariance)
+    }
+
+    /// Components with constants: name, first and one beyond the last of theirs in `theta`.
+    #[getter]
+    fn constants(&self) -> Vec<(&'static str, usize, usize)> {
+        self.inner.constants.iter().map(|(name, r)| (*name, r.start, r.end)).collect()
+    }
+
+    /// Names of the levels.
+    #[getter]
+    fn level_names(&self) -> Vec<&'static str> {
+        self.inner.level_names.clone()
+    }
+
+    /// Levels at each node (N, L), at the mode first.
+    #[getter]
+    fn levels(&self) -> Vec<Vec<f64>> {
+        self.inner.nodes.iter().map(|node| node.levels.clone()).collect()
+    }
+
+    /// Share of each node (N,).
+    #[getter]
+    fn weights(&self) -> Vec<f64> {
+        self.inner.nodes.iter().map(|node| node.weight).collect()
+    }
+
+    /// Covariance (n, n) at one node.
+    fn node_covariance<'py>(&self, py: Python<'py>, node: usize) -> PyResult<Floats<'py>> {
+        match self.inner.nodes.get(node) {
+            Some(node) => Ok(convert::dynamic_out(py, &node.covariance)),
+            None => Err(invalid(py, &format!("node {node} of {}", self.inner.nodes.len()))),
+        }
+    }
+
+    /// Degrees of freedom of the covariance of each `X`.
+    #[getter]
+    fn degrees_of_freedom(&self) -> Vec<f64> {
+        self.inner.degrees_of_freedom.clone()
+    }
+
+    /// Minus the logarithm of the posterior density of the levels at their mode.
+    #[getter]
+    fn value(&self) -> f64 {
+        self.inner.value
+    }
+
+    /// Linearisations, steps of the levels, and whether all came to rest.
+    #[getter]
+    fn effort(&self) -> (usize, usize, bool) {
+        (self.inner.rounds, self.inner.steps, self.inner.converged)
+    }
+
+    /// Where the start came from.
+    #[getter]
+    fn origin(&self) -> &'static str {
+        self.origin
+    }
+}

@@ -1,0 +1,163 @@
+"""What makes a posture usable as a view: distance, tilt, sight, and room for the arm there and on the way."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from handeye.errors import InputError
+from handeye.planning.collisions import Body
+from handeye.planning.visibility import obstacles
+from handeye.robots import Arm
+from handeye.solving.estimate import Estimate, Sight
+from handeye.types import Mounting
+from handeye.types.arrays import FloatArray, IndexArray
+
+NEAR_FAILURE = "near to where it failed before"
+
+
+@dataclass(frozen=True)
+class ViewLimits:
+    """What makes a view of the target usable.
+
+    Parameters
+    ----------
+    distance_m
+        Nearest and farthest distance of the camera from the middle of the target.
+    tilt_rad
+        Largest angle between the line of sight and the normal of the target.
+    margin_px
+        Distance of every point from the border of the image, besides what the estimate may be off.
+    fewest
+        Fewest points in sight; None for all.
+
+    Raises
+    ------
+    InputError
+        A range without inside.
+    """
+
+    distance_m: tuple[float, float] = (0.25, 0.9)
+    tilt_rad: float = float(np.deg2rad(45.0))
+    margin_px: float = 20.0
+    fewest: int | None = None
+
+    def __post_init__(self) -> None:
+        near, far = self.distance_m
+        if not 0 < near < far < float("inf") or not 0 < self.tilt_rad < np.pi / 2 or self.margin_px < 0:
+            raise InputError(
+                f"views from {near} to {far} m, tilted up to {np.rad2deg(self.tilt_rad):.0f} deg, margin "
+                f"{self.margin_px} px: expected ranges with an inside",
+                code="out_of_range",
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class ViewConstraints:
+    """Everything that a posture must pass, by what is believed now.
+
+    Parameters
+    ----------
+    body
+        The arm with what is mounted on it.
+    estimate
+        What is believed.
+    limits
+        What makes a view usable.
+    sight
+        What of the target must be seen, with the margin that the estimate's own uncertainty asks for.
+    taken
+        (K, n) postures that showed the target, at least one.
+    shunned
+        (F, n) postures where it failed: what is nearer to one than half its distance to the closest of
+        `taken` is left out.
+    """
+
+    body: Body
+    estimate: Estimate
+    limits: ViewLimits
+    sight: Sight
+    taken: FloatArray
+    shunned: FloatArray
+
+    @property
+    def arm(self) -> Arm:
+        """The arm."""
+        return self.body.arm
+
+    def passing(self, joints: FloatArray) -> tuple[IndexArray, Counter[str]]:
+        """Return which of postures (N, n) pass, in their order, and for which first reason others do not."""
+        left = np.arange(len(joints))
+        turned_down: Counter[str] = Counter()
+        # Each is asked only of what the ones before it let through; the costly ones come last.
+        for reasons in (self._bad_views, self._hidden, self.body.obstacles, self._failed_before):
+            why = reasons(joints[left])
+            turned_down.update(reason for reason in why if reason is not None)
+            left = left[[reason is None for reason in why]]
+        return left, turned_down
+
+    def motions(self, joints: FloatArray) -> FloatArray:
+        """(N, 4, 4) A of the chain at postures (N, n)."""
+        poses = self.arm.forward(joints).reshape(-1, 4, 4)
+        if self.estimate.mounting is Mounting.EYE_TO_HAND:
+            return poses
+        return np.asarray(np.linalg.inv(poses), dtype=np.float64)
+
+    def _bad_views(self, joints: FloatArray) -> Sequence[str | None]:
+        estimate = self.estimate
+        poses = estimate.X.matrix @ self.motions(joints) @ estimate.Y.matrix
+        middle = poses[:, :3, :3] @ estimate.target.points.mean(axis=0) + poses[:, :3, 3]
+        distance = np.linalg.norm(middle, axis=1)
+        cosine = np.einsum("ki,ki->k", poses[:, :3, 2], middle) / np.maximum(distance, 1e-9)
+        near, far = self.limits.distance_m
+        answers: list[str | None] = []
+        for length, toward in zip(distance, cosine, strict=True):
+            if not near <= length <= far:
+                answers.append("too near to the target or too far from it")
+            elif toward < np.cos(self.limits.tilt_rad):
+                answers.append("the target would be seen too obliquely")
+            else:
+                answers.append(None)
+        return answers
+
+    def _hidden(self, joints: FloatArray) -> Sequence[str | None]:
+        why = obstacles(self.estimate, self.motions(joints), self.sight)
+        return [None if reason is None else "the target would not be whole in the image" for reason in why]
+
+    def _failed_before(self, joints: FloatArray) -> Sequence[str | None]:
+        if len(self.shunned) == 0:
+            return [None] * len(joints)
+        to_failed = _distances(joints, self.shunned)
+        radius = 0.5 * _distances(self.shunned, self.taken).min(axis=1)
+        return [NEAR_FAILURE if near else None for near in (to_failed < radius).any(axis=1)]
+
+
+def sight_of(estimate: Estimate, limits: ViewLimits) -> Sight:
+    """Return what a view must show: the margin grows with what the estimate does not know."""
+    return Sight(limits.margin_px + _doubt_px(estimate, limits), limits.fewest)
+
+
+def mounted_points(estimate: Estimate) -> FloatArray:
+    """(P, 3) points in the flange of what is mounted there: the camera's centre, or the target's corners."""
+    if estimate.mounting is Mounting.EYE_IN_HAND:
+        return estimate.X.inverse().matrix[np.newaxis, :3, 3]
+    points = estimate.target.points
+    low, high = points.min(axis=0), points.max(axis=0)
+    corners = np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
+    return estimate.Y.act(corners)
+
+
+def _doubt_px(estimate: Estimate, limits: ViewLimits) -> float:
+    """Twice the deviation in px by which the estimate may misplace the target, up to a fifth of the image."""
+    covariance = estimate.covariance[:12, :12]
+    shift = np.sqrt(np.trace(covariance[:3, :3]) + np.trace(covariance[6:9, 6:9]))
+    turn = np.sqrt(np.trace(covariance[3:6, 3:6]))
+    focal = float(estimate.camera.parameters[:2].max())
+    deviation = focal * (shift / float(np.mean(limits.distance_m)) + turn)
+    return float(min(2 * deviation, 0.2 * min(estimate.camera.size_px)))
+
+
+def _distances(joints: FloatArray, others: FloatArray) -> FloatArray:
+    """(N, M) largest joint difference between postures (N, n) and (M, n)."""
+    return np.abs(joints[:, np.newaxis] - others[np.newaxis]).max(axis=2)
