@@ -1,6 +1,7 @@
 """The one place where errors become words and exit codes, and answers become output."""
 
 import contextlib
+import difflib
 import os
 import shlex
 import sys
@@ -26,6 +27,8 @@ def run(arguments: Sequence[str]) -> int:
     options = list(arguments)[: list(arguments).index("--")] if "--" in arguments else list(arguments)
     as_json, debug = "--json" in options, "--debug" in options
     try:
+        if next(iter(arguments), "") == "help":
+            arguments = [*arguments[1:2], "--help"]
         app = make_app(next(iter(arguments), ""))
         answer: Any = app(list(arguments), exit_on_error=False, print_error=False)
         if isinstance(answer, Answer):
@@ -63,7 +66,9 @@ def _usage(error: CycloptsError, arguments: Sequence[str]) -> HandeyeError:
     if named not in names:
         # Said here: the library would load every command to say it.
         message = "the command is missing" if named is None else f"no command {named!r}"
-        return UsageError(message, hint=f"there are {', '.join(names)}; handeye --help says more")
+        near = difflib.get_close_matches(named or "", names, 1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        return UsageError(message, hint=f"{meant}There are {', '.join(names)}; handeye --help says more")
     chain = " ".join(["handeye", *(error.command_chain or ())])
     message = " ".join(str(error).split())
     return UsageError(message, hint=f"{chain} --help says what can be asked").with_traceback(
