@@ -2,7 +2,7 @@
 
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
 from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, read_target
+from handeye.datasets.recording_format import FILE_NAME
 from handeye.errors import HandeyeError
 from handeye.importing import Opened, SourceOptions, open_any, open_folder
 from handeye.notations import Direction, Unit, notation_of
@@ -75,6 +76,16 @@ class Source:
         """
         notation = None if self.notation is None else notation_of(self.notation)
         return Statement(notation, self.unit, self.poses_are)
+
+    def of_a_recording(self, folder: Path) -> "Source":
+        """Return the options for a folder where what is said about poses means those of another file.
+
+        A recording says itself how its poses are written; pictures beside the other file are taken to be
+        written the same way.
+        """
+        if self.poses is not None or not (folder / FILE_NAME).is_file():
+            return self
+        return replace(self, notation=None, unit=None, poses_are=None)
 
     def _target(self) -> tuple[Target | None, tuple[int, int] | None]:
         if self.target is not None:
