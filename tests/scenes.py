@@ -8,7 +8,17 @@ import numpy as np
 from handeye import _core
 from handeye.cameras.render import Appearance, BoardRenderer
 from handeye.detection import Detection, NotFound
-from handeye.types import AprilGrid, Camera, Charuco, Chessboard, CircleGrid, Pose, Target
+from handeye.types import (
+    AprilGrid,
+    ArucoGrid,
+    ArucoMarker,
+    Camera,
+    Charuco,
+    Chessboard,
+    CircleGrid,
+    Pose,
+    Target,
+)
 from handeye.types.arrays import FloatArray
 
 WIDTH_PX, HEIGHT_PX = 520, 416
@@ -34,6 +44,8 @@ TARGETS: dict[str, Target] = {
     "marked circles": CircleGrid(6, 8, 0.03, 0.013, marked=19, marked_diameter_m=0.021),
     "charuco": Charuco(6, 8, 0.03, 0.0225, "DICT_4X4_50"),
     "april grid": AprilGrid(3, 4, 0.04, 0.3),
+    "aruco grid": ArucoGrid(3, 4, 0.04, 0.008, "DICT_5X5_250", first_id=20),
+    "marker": ArucoMarker(0.1, "DICT_ARUCO_ORIGINAL", 582),
 }
 TILTED = (0.35, -0.3, 0.2)
 

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from handeye.robots.simulated import ArmErrors
-from handeye.session.configuration import Configuration, Simulation, begin, go_on, prepare
+from handeye.session.configuration import begin, go_on, prepare
 from handeye.session.loop import End
+from handeye.session.settings import Configuration, Simulation
 from handeye.session.store import is_session, open_session
 
 QUICK = Configuration("epson_c4l", simulation=Simulation(points_only=0.1))
@@ -73,7 +74,8 @@ def run_killed(configuration: Configuration, folder: Path, random: np.random.Gen
                 code = 0
             finally:
                 os._exit(code)
-        deadline = time.monotonic() + random.exponential(mean_s)
+        # Longer lives after many kills: a slow machine gets to the end too.
+        deadline = time.monotonic() + random.exponential(mean_s) * (1 + kills / 20)
         while time.monotonic() < deadline:
             pid, status = os.waitpid(child, os.WNOHANG)
             if pid:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from handeye.types import (
     LENSES,
     AprilGrid,
+    ArucoGrid,
+    ArucoMarker,
     Camera,
     Charuco,
     Chessboard,
@@ -76,24 +78,52 @@ def circle_grids(draw: st.DrawFn) -> CircleGrid:
     return CircleGrid(rows, columns, pitch, diameter, draw(st.booleans()), marked, marked_diameter)
 
 
+def numbers(dictionary_size: int, markers: int) -> st.SearchStrategy[dict[str, object]]:
+    """How the markers of a board are numbered, and whether it is printed light on dark."""
+    listed = st.permutations(range(dictionary_size)).map(lambda order: tuple(order[:markers]))
+    first = st.integers(0, dictionary_size - markers).map(lambda number: {"first_id": number})
+    which = st.just({}) | first | listed.map(lambda ids: {"ids": ids})
+    return st.builds(lambda how, inverted: {**how, "inverted": inverted}, which, st.booleans())
+
+
 @st.composite
 def charucos(draw: st.DrawFn) -> Charuco:
     """ChArUco boards of 3 to 12 squares a side."""
     square = draw(floats(0.005, 0.2))
     rows, columns = draw(st.integers(3, 12)), draw(st.integers(3, 12))
-    return Charuco(
-        rows, columns, square, square * draw(floats(0.4, 0.9)), "DICT_5X5_100", draw(st.booleans())
+    marker = square * draw(floats(0.4, 0.9))
+    how = draw(numbers(100, rows * columns // 2))
+    return Charuco(rows, columns, square, marker, "DICT_5X5_100", draw(st.booleans()), **how)
+
+
+@st.composite
+def aprilgrids(draw: st.DrawFn) -> AprilGrid:
+    """AprilGrids of 1 to 8 tags a side."""
+    rows, columns = draw(st.integers(1, 8)), draw(st.integers(1, 8))
+    how = draw(numbers(587, rows * columns))
+    border = draw(st.integers(1, 2))
+    return AprilGrid(
+        rows, columns, draw(floats(0.01, 0.2)), draw(floats(0.1, 0.5)), border_bits=border, **how
     )
 
 
-def aprilgrids() -> st.SearchStrategy[AprilGrid]:
-    """AprilGrids of 1 to 8 tags a side."""
-    return st.builds(AprilGrid, st.integers(1, 8), st.integers(1, 8), floats(0.01, 0.2), floats(0.1, 0.5))
+@st.composite
+def aruco_grids(draw: st.DrawFn) -> ArucoGrid:
+    """Grids of 1 to 7 markers a side."""
+    rows, columns = draw(st.integers(1, 7)), draw(st.integers(1, 7))
+    side = draw(floats(0.01, 0.2))
+    how = draw(numbers(250, rows * columns))
+    return ArucoGrid(rows, columns, side, side * draw(floats(0.05, 1.5)), "DICT_6X6_250", **how)
+
+
+def aruco_markers() -> st.SearchStrategy[ArucoMarker]:
+    """Single markers."""
+    return st.builds(ArucoMarker, floats(0.01, 0.2), st.just("DICT_ARUCO_ORIGINAL"), st.integers(0, 1023))
 
 
 def targets() -> st.SearchStrategy[Target]:
     """Targets of every family."""
-    return st.one_of(chessboards(), circle_grids(), charucos(), aprilgrids())
+    return st.one_of(chessboards(), circle_grids(), charucos(), aprilgrids(), aruco_grids(), aruco_markers())
 
 
 @st.composite

@@ -29,10 +29,11 @@ import numpy as np
 from handeye.planning.collisions import Workspace
 from handeye.planning.constraints import ViewLimits, mounted_points
 from handeye.planning.feasibility import Generator
-from handeye.session.configuration import Configuration, Prepared, Simulation, begin, prepare
+from handeye.session.configuration import Prepared, begin, prepare
 from handeye.session.deciding import Step
 from handeye.session.entry import Failure
 from handeye.session.loop import End, Session
+from handeye.session.settings import Configuration, Simulation
 from handeye.session.store import SessionStore
 from handeye.types import Mounting
 

@@ -23,10 +23,10 @@ import cv2
 import numpy as np
 
 from handeye.robots.simulated import ArmErrors
-from handeye.session.attempt import Patience
-from handeye.session.configuration import Configuration, Simulation, begin, prepare
+from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import EndReason
 from handeye.session.faults import FaultRates
+from handeye.session.settings import Configuration, Simulation
 from handeye.types import Mounting
 
 MODELLED = ("none", "white_flange", "white_base", "encoder", "joint_offsets")
@@ -73,8 +73,7 @@ def disturbed(number: int) -> tuple[str, Configuration]:
     return fault, replace(
         quiet,
         failures_in_a_row=20,
-        patience=Patience(grab_s=0.2),
-        simulation=replace(quiet.simulation, faults=rates, hang_s=0.5),
+        simulation=replace(quiet.simulation, faults=rates),
     )
 
 

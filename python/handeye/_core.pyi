@@ -97,14 +97,24 @@ def fit_corners(
     bands: ArrayLike,
     is_crossing: bool,
     rough: bool,
-) -> NDArray[float64]:
+) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64]]:
     """Corners (N, 2) fitted to grey values; NaN where there is none near the guess.
+
+    Also the covariances (N, 2, 2) of the places for residuals of one grey value, the root mean squares (N,)
+    of the residuals in the smoothed picture, and the contrasts (N,).
 
     `image` (H, W) is contiguous. `places` (N, 2) are guesses, `directions` (N, 2, 2) those of the two edges,
     `curvatures` (N, 2) theirs in 1 / px towards the normals (-sin, cos); `radii` (N,) are free of other edges
     and `bands` (N,) the distances from the edges, in pixels, beyond which there is something else. At a
     crossing diagonal parts are equal and the light may change; else the four parts may be of any grey. A
     `rough` fit ends near the place, as is enough where it tells another fit where to begin.
+    """
+
+def crossing_neighbours(places: ArrayLike, angles: ArrayLike, off: float) -> NDArray[int64]:
+    """Number of the neighbour (N, 4) of each crossing along its edges, -1 for none.
+
+    `places` (N, 2); `angles` (N, 2) of the edges from u towards v, dark between the first and the second.
+    Rays are counted from u towards v from the first edge on; directions may be `off` by an angle in radians.
     """
 
 def area_centroids(
@@ -331,9 +341,10 @@ class Criterion:
 class Predictor:
     """Predicts what candidate views would tell, at motions A (N, 4, 4).
 
-    `free_joints`: joints whose offset is a parameter; `joint_noise` (n,): standard deviation of each joint,
-    in place of `robot_root` wherever `jacobians` (N, 6, n) of the candidates are given: truly
-    `exp(jacobians[i] dq) @ A`.
+    `robot_left`, `robot_right` (6, 6): square roots of the covariances of the robot's error on both sides of A.
+    `kinematic_count`: constants of the arm among the parameters. `arm` of the candidates: roots (N, 6, r) of
+    the noise of the joints on the left of A, and columns (N, 6, kinematic_count) of the constants; without it
+    the constants move nothing.
     """
 
     def __init__(
@@ -346,12 +357,11 @@ class Predictor:
         y: ArrayLike,
         *,
         pixel_sigma: float,
-        robot_side: str | None = None,
-        robot_root: ArrayLike | None = None,
+        robot_left: ArrayLike | None = None,
+        robot_right: ArrayLike | None = None,
         free_camera: list[int] | None = None,
         board_scale: bool = False,
-        free_joints: list[int] | None = None,
-        joint_noise: list[float] | None = None,
+        kinematic_count: int = 0,
         image_size: tuple[float, float] | None = None,
         margin_px: float = 0.0,
         fewest: int = 3,
@@ -362,7 +372,7 @@ class Predictor:
         criterion: Criterion,
         motions: ArrayLike,
         *,
-        jacobians: ArrayLike | None = None,
+        arm: tuple[ArrayLike, ArrayLike] | None = None,
         threads: int = 0,
         vector_unit: str | None = None,
     ) -> NDArray[float64]:
@@ -371,25 +381,12 @@ class Predictor:
         `threads` (0: as many as pay off) and `vector_unit` change nothing beyond rounding.
         """
 
-    def mean_gains(
-        self,
-        supposed: Sequence[tuple[float, Belief, str | None, ArrayLike | None]],
-        criterion: Criterion,
-        motions: ArrayLike,
-        *,
-        threads: int = 0,
-        vector_unit: str | None = None,
+    def informations(
+        self, motions: ArrayLike, *, arm: tuple[ArrayLike, ArrayLike] | None = None
     ) -> NDArray[float64]:
-        """Gain (N,) of each candidate, averaged over what the robot's error may be.
-
-        `supposed`: weight, belief, `robot_side` and `robot_root`, in place of the predictor's own. The points
-        of a candidate are looked at once.
-        """
-
-    def informations(self, motions: ArrayLike, *, jacobians: ArrayLike | None = None) -> NDArray[float64]:
         """Information (N, n, n) of each candidate; zero where too little would be in sight."""
 
-# Evidence
+# Estimation
 
 def start_from_poses(
     motions: ArrayLike,
@@ -401,36 +398,8 @@ def start_from_poses(
 ) -> tuple[NDArray[float64], NDArray[float64], float, str]:
     """X, Y, cost and origin that fit `poses[k] ~ X motions[k] Y` (K, 4, 4), from many starts and a prior."""
 
-class JointErrors:
-    """How errors of the joints of an arm move the motions: truly `exp(jacobians[k] dq) @ motions[k]`.
-
-    `jacobians` (K, 6, n), one per view of the problem. `scales` (n,): what a level of one radian means for
-    each joint, 1 for one that turns, metres for one that slides. `free`: joints whose offset is a parameter.
-    Levels of the noise
-    and of the offsets are found unless given.
-    """
-
-    def __init__(
-        self,
-        jacobians: ArrayLike,
-        scales: list[float],
-        free: list[int],
-        *,
-        noise_rad: float | None = None,
-        offset_rad: float | None = None,
-    ) -> None: ...
-
-class LinkErrors:
-    """How joints displaced on their links move the motions: truly `exp(jacobians[k] l) @ motions[k]`.
-
-    `jacobians` (K, 6, m), one per view of the problem; `lengths` (m,): whether each column is a displacement
-    in metres, otherwise a tilt in radians.
-    """
-
-    def __init__(self, jacobians: ArrayLike, lengths: list[bool]) -> None: ...
-
-class Compressed:
-    """Views of a problem, each reduced to the pose of its own image with that pose's information."""
+class PoseMeasurements:
+    """Views of one target through one camera, each as a pose (K, 4, 4) with its covariance."""
 
     def __init__(
         self,
@@ -440,68 +409,73 @@ class Compressed:
         free_camera: list[int] | None = None,
         board_scale: bool = False,
     ) -> None: ...
+    def __len__(self) -> int: ...
     @property
     def variances_px2(self) -> list[float]: ...
     @property
     def covariances(self) -> NDArray[float64]: ...
-    def shrunk_variances(
-        self, views: list[int] | None = None, *, prior_degrees: float = 20.0, floor_px2: float = 1e-8
-    ) -> list[float]: ...
-    def estimate(
-        self,
-        *,
-        views: list[int] | None = None,
-        camera_prior: ArrayLike | None = None,
-        start: tuple[ArrayLike, ArrayLike] | None = None,
-        prior_sigma_m: float = 1.0,
-        exact_probability: float = ...,
-        sides: list[str] | None = None,
-        levels: tuple[float, float] | None = None,
-        joints: JointErrors | None = None,
-        links: LinkErrors | None = None,
-        likeness: ArrayLike | None = None,
-        prior_degrees: float = 20.0,
-        floor_px2: float = 1e-8,
-        linearisations: int = 5,
-    ) -> Posterior:
-        """The answer from these views, averaged over a grid of robot noise levels and sides.
-
-        `levels` (metres, radians) gives them instead; then `sides` are all that is compared. With `joints`
-        noise of the joints is a further hypothesis, and their offsets are further parameters. With `links`
-        joints displaced on their links are further hypotheses. With `likeness` (K, K), the correlation of
-        smooth errors between the views, so are errors that change smoothly with the posture.
-        """
+    def shrunk_variances(self, *, prior_degrees: float, floor_px2: float) -> list[float]:
+        """Pixel variance of each view, drawn to their median, px^2."""
 
 class Posterior:
-    """What is believed after some views, under all hypotheses together."""
+    """What is believed of a cell."""
 
     @property
     def x(self) -> NDArray[float64]: ...
     @property
     def y(self) -> NDArray[float64]: ...
     @property
-    def smooth_probability(self) -> float: ...
-    @property
-    def link_twists(self) -> list[float]: ...
-    @property
-    def camera_delta(self) -> list[float]: ...
+    def theta(self) -> NDArray[float64]: ...
     @property
     def covariance(self) -> NDArray[float64]: ...
     @property
-    def joint_offsets(self) -> list[float]: ...
+    def information(self) -> NDArray[float64]: ...
     @property
-    def joint_levels(self) -> list[tuple[float, float]]: ...
+    def constants(self) -> list[tuple[str, int, int]]: ...
     @property
-    def degrees_of_freedom(self) -> float: ...
+    def level_names(self) -> list[str]: ...
     @property
-    def log_evidence(self) -> float: ...
+    def levels(self) -> list[list[float]]: ...
+    @property
+    def weights(self) -> list[float]: ...
+    @property
+    def degrees_of_freedom(self) -> list[float]: ...
+    @property
+    def attribution(self) -> list[tuple[str, float, float]]: ...
+    @property
+    def robot_loss(self) -> float: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def effort(self) -> tuple[int, int, bool]: ...
     @property
     def origin(self) -> str: ...
-    @property
-    def variances_px2(self) -> list[float]: ...
-    @property
-    def hypotheses(self) -> list[tuple[str, float, float, float]]: ...
-    def information(self, rank: int) -> NDArray[float64]: ...
+    def node_covariance(self, node: int) -> NDArray[float64]: ...
+
+def estimate_cell(
+    stations: ArrayLike,
+    cameras: Sequence[tuple[bool, int, bool, tuple[ArrayLike, ArrayLike, bool] | None]],
+    targets: Sequence[bool],
+    seen: Sequence[tuple[int, int, PoseMeasurements, list[int], list[float]]],
+    *,
+    velocities: ArrayLike | None = None,
+    arm: tuple[ArrayLike, ArrayLike, list[float], list[int], list[bool]] | None = None,
+    exact_robot: bool = False,
+    board_scale: bool = False,
+    start: tuple[ArrayLike, ArrayLike] | None = None,
+    pairs: int,
+    most_rounds: int,
+) -> Posterior:
+    """The posterior of everything in a cell.
+
+    `stations` (S, 4, 4) are `T_base_flange` as reported. A camera is whether it is on the flange, its number of
+    free parameters, whether its prior comes from these very pixels, and that prior: information (n, n), mean
+    (n,), whether it may be too narrow by a level that is found. `targets`: whether each is on the flange.
+    `seen`: camera, target, its views, and for each of these its station and pixel variance in px^2.
+    `velocities` (S, 6): twists of the flange per second. `arm`: twists (S, 6, n) of the flange per joint and
+    (S, 6, m) per way of displacing a joint on its link, what a deviation of one means for each joint, joints
+    whose offset is a parameter, and which ways are in metres. `start`: X (C, 4, 4) and Y (T, 4, 4).
+    """
 
 # Kinematics
 

@@ -8,6 +8,13 @@ from enum import IntEnum
 from typing import ClassVar
 
 
+def printable(text: object, limit: int) -> str:
+    """Return a text of others, shortened, without what cannot be shown or would steer a terminal."""
+    shown = str(text)
+    cut = shown[:limit] + ("..." if len(shown) > limit else "")
+    return "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in cut)
+
+
 class ExitCode(IntEnum):
     """Exit codes of the command line."""
 

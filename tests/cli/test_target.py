@@ -7,11 +7,9 @@ from typing import Any
 import pytest
 
 from handeye.cli.boundary import run
-from handeye.cli.target import _OWN, _SCALES
 from handeye.datasets import read_target
 from handeye.errors import ExitCode
-from handeye.printing import BOARDS
-from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid
+from handeye.types import AprilGrid, ArucoGrid, ArucoMarker, Charuco, Chessboard, CircleGrid, Target
 
 
 def answered(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
@@ -20,11 +18,7 @@ def answered(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, A
     return json.loads(capsys.readouterr().out)
 
 
-def test_every_family_has_its_measures() -> None:
-    assert set(_OWN) == set(_SCALES) == set(BOARDS)
-
-
-@pytest.mark.parametrize("family", BOARDS)
+@pytest.mark.parametrize("family", Target.members)
 @pytest.mark.parametrize("suffix", [".pdf", ".svg"])
 def test_page_and_target_file(
     family: str, suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -55,6 +49,19 @@ def test_page_and_target_file(
         (
             "aprilgrid --rows 3 --columns 4 --tag-mm 40 --spacing-ratio 0.25 --border-bits 1",
             AprilGrid(3, 4, 0.04, 0.25, border_bits=1),
+        ),
+        (
+            "aruco-grid --rows 4 --columns 3 --marker-mm 40 --separation-mm 4 --first-id 12 --inverted",
+            ArucoGrid(4, 3, 0.04, 0.004, "DICT_5X5_250", first_id=12, inverted=True),
+        ),
+        (
+            "aruco_grid --rows 1 --columns 3 --marker-mm 40 --separation-mm 4 --ids 3,9,1",
+            ArucoGrid(1, 3, 0.04, 0.004, "DICT_5X5_250", ids=(3, 9, 1)),
+        ),
+        ("aruco-marker --marker-mm 100 --id 582", ArucoMarker(0.1, "DICT_ARUCO_ORIGINAL", 582)),
+        (
+            "charuco --rows 6 --columns 5 --square-mm 30 --marker-mm 20 --legacy-pattern",
+            Charuco(6, 5, 0.03, 0.02, "DICT_5X5_100", True),
         ),
     ],
 )
@@ -123,7 +130,10 @@ def test_a_person_is_told_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixtu
         ("chessboard --output b.pdf --rows 0 --pitch-mm -1", ExitCode.UNUSABLE_INPUT),
         ("chessboard --output b.pdf --pitch-mm nan", ExitCode.UNUSABLE_INPUT),
         ("chessboard --output b.pdf --tag-mm 3", ExitCode.USAGE),
-        ("charuco --output b.pdf --border-bits 1", ExitCode.USAGE),
+        ("chessboard --output b.pdf --border-bits 1", ExitCode.USAGE),
+        ("aruco_grid --output b.pdf --ids 1,x", ExitCode.USAGE),
+        ("aruco_grid --output b.pdf --ids 1,2,3", ExitCode.UNUSABLE_INPUT),
+        ("charuco --output b.pdf --dictionary DICT_5X5_50 --first-id 30", ExitCode.UNUSABLE_INPUT),
         ("aprilgrid --output b.pdf --dictionary DICT_4X4_50", ExitCode.UNUSABLE_INPUT),
         ("chessboard --output b.pdf --pitch-mm 500", ExitCode.UNUSABLE_INPUT),
         ("checkers --output b.pdf", ExitCode.UNUSABLE_INPUT),

@@ -34,9 +34,11 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
         return called
 
-    for table, what in (("_FINDERS", "whole"), ("_CONFIRMERS", "expected")):
-        functions = {family: watched(f, what) for family, f in getattr(MODULE, table).items()}
-        monkeypatch.setattr(MODULE, table, functions)
+    kinds = tuple(
+        replace(kind, find=watched(kind.find, "whole"), confirm=watched(kind.confirm, "expected"))
+        for kind in MODULE.KINDS
+    )
+    monkeypatch.setattr(MODULE, "KINDS", kinds)
     return seen
 
 

@@ -156,3 +156,10 @@ def test_digests_are_the_same_in_another_process() -> None:
         for _ in range(2)
     }
     assert len(said) == 1
+
+
+def test_results_are_brought_to_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[int] = []
+    monkeypatch.setattr("handeye.evaluation.checkpoint.os.fsync", synced.append)
+    run_all(compute, [0.1, 0.2], workers=Checkpoint(tmp_path))
+    assert synced

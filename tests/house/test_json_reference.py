@@ -6,14 +6,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import pytest
 
 from commands import Handeye
 from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
 from handeye.datasets.shipped import shipped_recording
+from handeye.datasets.toml_text import toml_text
 from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
-from handeye.types import Mounting
+from handeye.types import Charuco, Mounting
+from scenes import scene
 
 ROOT = Path(__file__).resolve().parents[2]
 REFERENCE = (ROOT / "docs" / "json.md").read_text()
@@ -133,6 +136,15 @@ def test_export(handeye: Handeye, shipped: Path) -> None:
 
 def test_target(handeye: Handeye, tmp_path: Path) -> None:
     compare("handeye target", handeye.json("target", "chessboard", "--output", tmp_path / "board.svg"))
+
+
+def test_detect(handeye: Handeye, tmp_path: Path) -> None:
+    board = Charuco(6, 8, 0.03, 0.0225, "DICT_4X4_50")
+    for name, shown in (("a", board), ("b", board.changed(rows=7))):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), scene(shown).picture())
+    described = tmp_path / "board.toml"
+    described.write_text(toml_text(board.to_dict()))
+    compare("handeye detect", handeye.json("detect", tmp_path, "--target", described))
 
 
 def test_demo(handeye: Handeye, tmp_path: Path) -> None:

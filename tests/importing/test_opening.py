@@ -65,7 +65,7 @@ def test_wrong_pattern_is_refused_before_all_images_are_searched(pictures: tuple
     steps: list[int] = []
     with pytest.raises(DetectionError) as caught:
         open_folder(pictures[0], SourceOptions(pattern=(6, 8)), progress=lambda done, _: steps.append(done))
-    assert "the first 4 of 8 images show a target of another size" in caught.value.message
+    assert "the first 4 of 8 images show another target" in caught.value.message
     assert (caught.value.code, max(steps)) == ("not_detected", 4)
 
 

@@ -9,7 +9,8 @@ from cells import Cell
 from handeye.errors import InputError
 from handeye.planning import Pool
 from handeye.planning.batch import OBJECTIVES, plan_batch
-from handeye.solving import AutoEstimator, Estimate, Measurements, Sight, paper_estimate
+from handeye.planning.prediction import Prediction, Sight
+from handeye.solving import AutoEstimator, Estimate, Measurements, paper_estimate
 from handeye.types.arrays import FloatArray
 
 BOX = [[x, y, z] for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (0.4, 0.8)]
@@ -43,9 +44,9 @@ def test_five_of_twenty_seven_against_every_choice(objective: str) -> None:
     """All 80,730 choices are tried: the plan reaches 0.995 of the best, the bound is never below it."""
     estimate, pool = situation(1, 27)
     plan = plan_batch(estimate, pool, 5, objective=objective, tool_points_m=BOX)
-    base = estimate.hypotheses[0].information
-    predictor = estimate.predictor(estimate.hypotheses[0], Sight())
-    informations = predictor.informations(pool.motions(estimate.mounting))
+    prediction = Prediction(estimate, Sight())
+    base = estimate.information
+    informations = prediction.informations(pool.motions(estimate.mounting))
     assert (np.trace(informations, axis1=1, axis2=2) > 0).all()
     best = -np.inf
     choices = np.array(list(combinations(range(27), 5)))
@@ -65,7 +66,7 @@ def test_with_robot_noise_and_camera_parameters() -> None:
     plan = plan_batch(estimate, pool, 4, objective="entropy_handeye")
     assert len({candidate.name for candidate in plan.candidates}) == 4
     assert 0.8 < plan.efficiency <= 1
-    before = np.linalg.inv(estimate.hypotheses[0].information)[:6, :6]
+    before = np.linalg.inv(estimate.information)[:6, :6]
     assert np.linalg.eigvalsh(before - plan.covariance).min() > 0
     assert "no choice of 4 of these poses" in plan.sentence
 

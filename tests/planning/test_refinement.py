@@ -9,6 +9,7 @@ import pytest
 from handeye.planning import Planner, PlannerOptions, Proposal, make_policy
 from handeye.planning.constraints import ViewLimits
 from handeye.planning.feasibility import FeasiblePool, Generator
+from handeye.planning.prediction import Prediction
 from handeye.planning.refinement import Refined, Refinement, offered, refine
 from handeye.planning.travel import Travel
 from handeye.robots import ArmKinematics
@@ -42,7 +43,7 @@ class Scene:
     def gains(self, joints: FloatArray) -> FloatArray:
         constraints = self.drawn.constraints
         motions = constraints.motions(joints)
-        return self.estimate.gains(self.options.criterion, motions, constraints.sight, joints=joints)
+        return Prediction(self.estimate, constraints.sight).gains(self.options.criterion, motions, joints)
 
     @property
     def joints(self) -> FloatArray:

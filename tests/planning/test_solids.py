@@ -11,7 +11,8 @@ from handeye.planning.collisions import TOUCHES_ITSELF, Body, Workspace
 from handeye.planning.solids import PADDING_M, SolidLinks
 from handeye.robots.model import Arm, Joint
 from handeye.robots.shapes import Shape
-from handeye.session.configuration import Collisions, Configuration, begin, prepare
+from handeye.session.configuration import begin, prepare
+from handeye.session.settings import Collisions, Configuration
 from handeye.types import Pose
 from sessions import configured
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from handeye.errors import OutputError
-from handeye.printing import BOARDS, Measures, Paper, largest, lay_out
+from handeye.printing import Paper, largest, lay_out
 from handeye.printing.page import page
 from handeye.printing.shapes import Area, Disc, Drawing, Line, Words, rectangle
+from handeye.types import Target
 from handeye.types.arrays import FloatArray
 from ink import is_black, is_inside
 
@@ -19,7 +20,8 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def a_drawing(family: str, paper: str = "a4") -> Drawing:
-    measures = Measures(rows=4, columns=5, marked=3 if family == "circle_grid" else None)
+    shape = {"rows": 4, "columns": 5} if "rows" in Target.member(family).fields() else {}
+    measures = {**shape, **({"marked": 3} if family == "circle_grid" else {})}
     return lay_out(largest(family, measures, Paper.of(paper)), Paper.of(paper)).drawing
 
 
@@ -51,7 +53,7 @@ def pdf_loops(content: str, height_mm: float) -> list[FloatArray]:
 
 @pytest.mark.parametrize(
     ("family", "paper"),
-    [*((family, "a4") for family in BOARDS), ("chessboard", "letter"), ("aprilgrid", "333x222")],
+    [*((family, "a4") for family in Target.members), ("chessboard", "letter"), ("aprilgrid", "333x222")],
 )
 def test_pdf_has_true_scale(family: str, paper: str) -> None:
     drawing = a_drawing(family, paper)
@@ -85,7 +87,7 @@ def test_pdf_has_true_scale(family: str, paper: str) -> None:
     assert not re.search(r"^f\*$", commands, re.MULTILINE)
 
 
-@pytest.mark.parametrize("family", BOARDS)
+@pytest.mark.parametrize("family", Target.members)
 def test_svg_has_true_scale(family: str) -> None:
     drawing = a_drawing(family)
     root = ET.fromstring(page(drawing, "svg"))

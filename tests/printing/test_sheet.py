@@ -7,34 +7,34 @@ from matplotlib.textpath import TextPath
 
 from handeye.datasets import read_target
 from handeye.errors import InputError
-from handeye.printing import BOARDS, Measures, Paper, board_of, largest, lay_out, target_file
-from handeye.printing.boards import ink_of
+from handeye.printing import Paper, largest, lay_out, target_file
+from handeye.printing.ink import ink_of
 from handeye.printing.shapes import Area, Disc, Line, Words
 from handeye.printing.sheet import MARGIN_MM
-from handeye.types import Chessboard, CircleGrid
+from handeye.types import Chessboard, CircleGrid, Target
 
 PAPERS = ["a4", "a3", "letter", "100x80", "600x400", "60x900"]
 
 
-@pytest.mark.parametrize("family", BOARDS)
+@pytest.mark.parametrize("family", Target.members)
 @pytest.mark.parametrize("name", PAPERS)
 def test_the_largest_fits_and_a_larger_one_does_not(family: str, name: str) -> None:
     paper = Paper.of(name)
-    target = largest(family, Measures(), paper)
+    target = largest(family, {}, paper)
     lay_out(target, paper)
     measures = target.to_dict()
-    field = next(name for name in ("pitch_m", "square_m", "tag_m") if name in measures)
+    field = Target.member(family).scale
     scale_mm = measures[field] * 1000
     step = 1.0 if scale_mm >= 10 else 0.5 if scale_mm >= 5 else 0.1
     assert scale_mm / step == pytest.approx(round(scale_mm / step))
     with pytest.raises(InputError, match="needs"):
-        lay_out(board_of(family).usual((scale_mm + 1.25 * step) / 1000, Measures()), paper)
+        lay_out(Target.member(family).usual((scale_mm + 1.25 * step) / 1000, {}), paper)
 
 
-@pytest.mark.parametrize("family", BOARDS)
+@pytest.mark.parametrize("family", Target.members)
 @pytest.mark.parametrize("name", PAPERS)
 def test_nothing_leaves_the_paper_or_comes_near_the_board(family: str, name: str) -> None:
-    sheet = lay_out(largest(family, Measures(), Paper.of(name)), Paper.of(name))
+    sheet = lay_out(largest(family, {}, Paper.of(name)), Paper.of(name))
     drawing = sheet.drawing
     ink = ink_of(sheet.target)
     low, high = ink.low + sheet.origin_mm, ink.high + sheet.origin_mm
@@ -95,9 +95,9 @@ def test_origin_is_where_the_first_point_is() -> None:
     assert [first.x, first.y] == pytest.approx(sheet.origin_mm)
 
 
-@pytest.mark.parametrize("family", BOARDS)
+@pytest.mark.parametrize("family", Target.members)
 def test_target_file_reads_back(family: str, tmp_path_factory: pytest.TempPathFactory) -> None:
-    sheet = lay_out(largest(family, Measures(), Paper.of("a4")), Paper.of("a4"))
+    sheet = lay_out(largest(family, {}, Paper.of("a4")), Paper.of("a4"))
     path = tmp_path_factory.mktemp("target") / "board.toml"
     path.write_text(target_file(sheet))
     assert read_target(path) == sheet.target
@@ -105,7 +105,7 @@ def test_target_file_reads_back(family: str, tmp_path_factory: pytest.TempPathFa
 
 def test_what_cannot_fit_says_so() -> None:
     with pytest.raises(InputError, match="does not fit"):
-        largest("chessboard", Measures(rows=60, columns=4), Paper.of("50x50"))
+        largest("chessboard", {"rows": 60, "columns": 4}, Paper.of("50x50"))
     with pytest.raises(InputError, match="A4") as caught:
         lay_out(Chessboard(6, 9, 0.05), Paper.of("a4"))
     assert caught.value.code == "does_not_fit"

@@ -6,9 +6,9 @@ import pytest
 
 from handeye.report.document import Within
 from handeye.report.history import MOST_POINTS, attempts, curve, request
-from handeye.session.configuration import Configuration
 from handeye.session.entry import Entry, Failure
 from handeye.session.request import reach
+from handeye.session.settings import Configuration
 from handeye.session.store import create_session
 from handeye.solving import Measurements, make_estimator
 from handeye.types import Pose

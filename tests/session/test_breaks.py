@@ -15,7 +15,7 @@ from handeye.session.configuration import begin, go_on, prepare
 from handeye.session.deciding import EndReason
 from handeye.session.entry import Entry
 from handeye.session.faults import FaultRates
-from handeye.session.store import create_session, open_session, read_journal
+from handeye.session.store import create_session, open_session
 from sessions import Outcome, configured, run, run_killed
 
 pytestmark = pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
@@ -71,19 +71,6 @@ def test_killed_between_any_two_writes_it_ends_as_if_undisturbed(
     assert Outcome.of(folder) == undisturbed
 
 
-def test_a_line_cut_off_is_as_if_never_written(tmp_path: Path) -> None:
-    run(configured(2), tmp_path / "a")
-    whole = Outcome.of(tmp_path / "a")
-    journal = tmp_path / "a" / "journal.jsonl"
-    content = journal.read_bytes()
-    journal.write_bytes(content[:-40])
-    entries, size = read_journal(journal)
-    assert len(entries) == len(whole.journal) - 1
-    assert size == content[:-40].rfind(b"\n") + 1
-    run(configured(2), tmp_path / "a")
-    assert Outcome.of(tmp_path / "a") == whole
-
-
 def test_edited_or_foreign_files_are_refused_in_words(tmp_path: Path) -> None:
     run(configured(2, most_views=4), tmp_path / "a")
     journal, settings = tmp_path / "a" / "journal.jsonl", tmp_path / "a" / "session.json"
@@ -108,7 +95,7 @@ def test_edited_or_foreign_files_are_refused_in_words(tmp_path: Path) -> None:
         "",
         "[]",
         '{"format": "x"}',
-        '{"format": "handeye-session", "version": 2}',
+        '{"format": "handeye-session", "version": 3}',
         said[:-30].decode(),
     ):
         settings.write_text(text)
@@ -166,7 +153,8 @@ def test_an_interruption_stops_the_arm_and_leaves_the_session_whole(
     with pytest.raises(KeyboardInterrupt):
         session.run()
     store.close()
-    assert stopped == [True]
+    # Once to see before the first motion that it can be stopped, once as it was interrupted.
+    assert stopped == [True, True]
     assert run(configuration, tmp_path / "a").reason is EndReason.ACCURACY_REACHED
     run(configuration, tmp_path / "b")
     assert Outcome.of(tmp_path / "a") == Outcome.of(tmp_path / "b")

@@ -12,14 +12,15 @@ from handeye.datasets import read_recording
 from handeye.errors import DeviceError, InputError
 from handeye.robots import ArmKinematics, open_arm
 from handeye.robots.protocol import Goal
-from handeye.session.attempt import Cell, Missed, Patience, attempt
+from handeye.session.attempt import Cell, Missed, attempt
+from handeye.session.calls import Calls
 from handeye.session.choosing import ArmChooser
-from handeye.session.configuration import Configuration, Prepared, begin, prepare
+from handeye.session.configuration import Prepared, begin, prepare
 from handeye.session.deciding import EndReason
 from handeye.session.entry import Failure
 from handeye.session.faults import FaultRates
 from handeye.session.loop import End, Session
-from handeye.session.patience import within
+from handeye.session.settings import Configuration
 from handeye.session.simulated import SimulatedCell, SimulationOptions, simulated_cell
 from handeye.session.store import SessionStore, create_session
 from handeye.session.wish import Wish
@@ -130,8 +131,7 @@ FAULTS = [
 @pytest.mark.parametrize("faults", FAULTS, ids="-".join)
 def test_each_fault_is_noticed_named_and_overcome(faults: dict[str, Failure | None], tmp_path: Path) -> None:
     rates = FaultRates(**dict.fromkeys(faults, 0.3))
-    patience = Patience(grab_s=0.1)
-    configuration = configured(13, faults=rates, hang_s=0.3, patience=patience, failures_in_a_row=20)
+    configuration = configured(13, faults=rates, failures_in_a_row=20)
     end, prepared, store = ended(configuration, tmp_path / "s")
     assert end.reason is EndReason.ACCURACY_REACHED
     assert true_error(end, prepared)[0] < 1.0
@@ -177,11 +177,12 @@ def _goal(prepared: Prepared) -> Goal:
 
 
 def test_a_driver_that_hangs_or_raises_becomes_an_error_of_ours() -> None:
+    for seconds in (1.0, float("inf")):
+        with pytest.raises(DeviceError, match="camera: ZeroDivisionError"):
+            Calls("camera").run(seconds, lambda: 1 // 0)
+        assert Calls("camera").run(seconds, int, "7") == 7
     with pytest.raises(DeviceError, match=r"no answer within 0\.05 s"):
-        within(0.05, "camera", threading.Event().wait, 1.0)
-    with pytest.raises(DeviceError, match="ZeroDivisionError"):
-        within(1.0, "camera", lambda: 1 // 0)
-    assert within(1.0, "camera", int, "7") == 7
+        Calls("camera").run(0.05, threading.Event().wait, 1.0)
 
 
 def test_the_decisions_say_how_they_came_about(tmp_path: Path) -> None:

@@ -14,10 +14,11 @@ from handeye.errors import InputError
 from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
 from handeye.robots.protocol import Goal
 from handeye.robots.replay import ReplayRobot
-from handeye.session.configuration import Configuration, Prepared, begin, go_on, prepare
+from handeye.session.configuration import Prepared, begin, go_on, prepare
 from handeye.session.deciding import EndReason
 from handeye.session.entry import Failure
 from handeye.session.loop import End
+from handeye.session.settings import Configuration
 from handeye.session.store import SessionStore
 from handeye.solving import solve
 from handeye.types import Pose, View

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from handeye.errors import InputError
 from handeye.types import Pose
+from handeye.types.pose import through_twist
 from strategies import plain_values, poses, twists, vectors
 
 GENERIC = Pose.exp([0.3, -0.2, 0.9, 0.4, -1.1, 0.6])
@@ -198,3 +199,15 @@ def test_roll_pitch_yaw_at_the_end_of_pitch(pitch: float) -> None:
     np.testing.assert_allclose(
         Rotation.from_euler("xyz", T.roll_pitch_yaw_rad).as_matrix(), rotation, atol=1e-12
     )
+
+
+def test_derivatives_in_a_twist_are_those_of_the_moved_points() -> None:
+    random = np.random.default_rng(5)
+    points, weights = random.normal(size=(7, 3)), random.normal(size=(7, 2, 3))
+
+    def values(xi: np.ndarray) -> np.ndarray:
+        return np.einsum("nmk,nk->nm", weights, Pose.exp(xi).act(points))
+
+    found = through_twist(points, weights)
+    for i, step in enumerate(1e-6 * np.eye(6)):
+        np.testing.assert_allclose(found[:, :, i], (values(step) - values(-step)) / 2e-6, atol=1e-8)

@@ -109,7 +109,7 @@ fn count_score(repeats: usize, points: u32, distorted: bool, noisy: bool, unit: 
         y: solution.y,
         features: &scene.features,
         pixel_sigma: SIGMA_PX,
-        robot: noisy.then(|| (Side::Left, Matrix6::identity() * 5e-4)),
+        robot: RobotError { left: noisy.then(|| Matrix6::identity() * 5e-4), right: None },
         pixel_parameters: None,
         kinematic_count: 0,
         visibility: Visibility {

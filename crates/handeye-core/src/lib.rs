@@ -8,7 +8,6 @@ pub mod camera;
 pub mod closed_form;
 pub mod error;
 pub mod estimation;
-pub mod evidence;
 pub mod imaging;
 pub mod information;
 pub mod kinematics;

@@ -2,7 +2,7 @@
 
 use handeye_core::estimation::{
     Assumptions, Body, CameraPrior, Cell, Measurement, Options, PoseMeasurement, Posterior as CorePosterior,
-    SeenBy, Station, WeakPrior, compress, estimate, shrunk_variances, start_of_cell,
+    SeenBy, Station, WeakPrior, compress, estimate, shrunk_variances, start_from_poses, start_of_cell,
 };
 use handeye_core::least_squares::PixelParameters;
 use handeye_core::se3::Se3;
@@ -17,16 +17,50 @@ use crate::problem::Problem;
 
 /// Registers the classes and functions of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(start_from_poses_py, module)?)?;
     module.add_class::<PoseMeasurements>()?;
     module.add_class::<Posterior>()?;
-    module.add_function(wrap_pyfunction!(set_tuning, module)?)?;
     module.add_function(wrap_pyfunction!(estimate_cell, module)?)
 }
-#[pyfunction]
-fn set_tuning(v: Vec<f64>) { *handeye_core::estimation::tuning::T.write().unwrap() = v; }
-
 
 type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
+
+fn weak_prior(translation_m: f64) -> WeakPrior {
+    WeakPrior { x_translation_sigma_m: translation_m, ..WeakPrior::default() }
+}
+
+type Chain<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, f64, &'static str);
+
+fn given(py: Python<'_>, start: Option<(Array<'_>, Array<'_>)>) -> PyResult<Option<(Se3, Se3)>> {
+    start
+        .map(|(x, y)| Ok((convert::transform(py, "start X", &x)?, convert::transform(py, "start Y", &y)?)))
+        .transpose()
+}
+
+#[pyfunction]
+#[pyo3(name = "start_from_poses", signature = (motions, poses, covariances, *, start=None, prior_sigma_m=1.0))]
+fn start_from_poses_py<'py>(
+    py: Python<'py>,
+    motions: Array<'py>,
+    poses: Array<'py>,
+    covariances: Array<'py>,
+    start: Option<(Array<'py>, Array<'py>)>,
+    prior_sigma_m: f64,
+) -> PyResult<Chain<'py>> {
+    let motions = convert::transforms(py, "motions", &motions)?;
+    let poses = convert::transforms(py, "poses", &poses)?;
+    let covariances = convert::matrices::<6, 6>(py, "covariances", &covariances)?;
+    let start = given(py, start)?;
+    let found = py
+        .detach(|| start_from_poses(&motions, &poses, &covariances, &weak_prior(prior_sigma_m), start))
+        .map_err(|e| to_python(py, e))?;
+    Ok((
+        convert::matrix_out(py, &found.x.to_matrix()),
+        convert::matrix_out(py, &found.y.to_matrix()),
+        found.cost,
+        found.origin,
+    ))
+}
 
 /// Views of one target through one camera, each as a pose with its covariance.
 #[pyclass(frozen, module = "handeye._core")]
@@ -56,11 +90,7 @@ impl PoseMeasurements {
             return Err(invalid(py, &format!("camera parameter {i} of a lens with {most}")));
         }
         let columns = free.len() + usize::from(board_scale);
-        let parameters = (columns > 0).then(|| PixelParameters {
-            prior_information: DMatrix::zeros(columns, columns),
-            camera: free,
-            board_scale,
-        });
+        let parameters = (columns > 0).then(|| PixelParameters { camera: free, board_scale });
         let views = py
             .detach(|| {
                 poses
@@ -98,8 +128,8 @@ impl PoseMeasurements {
     }
 }
 
-/// Whether it is on the flange, number of free parameters, and the prior: information, mean, whether it is inflated.
-type CameraGiven<'py> = (bool, usize, Option<(Array<'py>, Array<'py>, bool)>);
+/// Whether it is on the flange, number of free parameters, whether the prior comes from these pixels, and the prior: information, mean, whether it is inflated.
+type CameraGiven<'py> = (bool, usize, bool, Option<(Array<'py>, Array<'py>, bool)>);
 /// Jacobians of joints and links per station, scales and free joints, and which ways of displacing are in metres.
 type ArmGiven<'py> = (Array<'py>, Array<'py>, Vec<f64>, Vec<usize>, Vec<bool>);
 /// Camera, target, measurements, and for each of these its station and pixel variance.
@@ -112,7 +142,7 @@ fn body(on_flange: bool) -> Body {
 /// The posterior of a cell; see the type stub.
 #[pyfunction]
 #[pyo3(signature = (
-    stations, cameras, targets, seen, *, arm=None, exact_robot=false, board_scale=false, start=None,
+    stations, cameras, targets, seen, *, velocities=None, arm=None, exact_robot=false, board_scale=false, start=None,
     pairs, most_rounds,
 ))]
 #[expect(clippy::too_many_arguments, reason = "one argument per part of a cell")]
@@ -122,6 +152,7 @@ fn estimate_cell<'py>(
     cameras: Vec<CameraGiven<'py>>,
     targets: Vec<bool>,
     seen: Vec<SeenGiven<'py>>,
+    velocities: Option<Array<'py>>,
     arm: Option<ArmGiven<'py>>,
     exact_robot: bool,
     board_scale: bool,
@@ -142,18 +173,23 @@ fn estimate_cell<'py>(
             (scales, free, lengths);
         of_arm = Some((joints, links));
     }
+    let velocities = velocities.map(|v| convert::vectors::<6>(py, "velocities", &v)).transpose()?;
+    if velocities.as_ref().is_some_and(|v| v.len() != poses.len()) {
+        return Err(invalid(py, "velocities must be as many as stations"));
+    }
     let stations = poses
         .iter()
         .enumerate()
         .map(|(k, pose)| Station {
             pose: *pose,
+            velocity: velocities.as_ref().map(|v| v[k]),
             joints: of_arm.as_ref().map(|(joints, _)| joints[k].clone()),
             links: of_arm.as_ref().map(|(_, links)| links[k].clone()),
         })
         .collect();
     let cameras = cameras
         .into_iter()
-        .map(|(on_flange, parameters, prior)| {
+        .map(|(on_flange, parameters, from_these_pixels, prior)| {
             let prior = prior
                 .map(|(information, mean, inflated)| {
                     Ok::<_, PyErr>(CameraPrior {
@@ -163,7 +199,7 @@ fn estimate_cell<'py>(
                     })
                 })
                 .transpose()?;
-            Ok(SeenBy { body: body(on_flange), parameters, prior })
+            Ok(SeenBy { body: body(on_flange), parameters, from_these_pixels, prior })
         })
         .collect::<PyResult<Vec<_>>>()?;
     let mut measurements = Vec::new();
@@ -192,10 +228,7 @@ fn estimate_cell<'py>(
     };
     let given = start
         .map(|(x, y)| {
-            Ok::<_, PyErr>((
-                convert::transforms(py, "start X", &x)?,
-                convert::transforms(py, "start Y", &y)?,
-            ))
+            Ok::<_, PyErr>((convert::transforms(py, "start X", &x)?, convert::transforms(py, "start Y", &y)?))
         })
         .transpose()?;
     let options = Options { assumptions, weak: WeakPrior::default(), pairs, most_rounds };
@@ -288,6 +321,24 @@ impl Posterior {
     #[getter]
     fn value(&self) -> f64 {
         self.inner.value
+    }
+
+    /// Components of the error: name, fall of the log likelihood without it, mean square misfit it explains.
+    #[getter]
+    fn attribution(&self) -> Vec<(&'static str, f64, f64)> {
+        self.inner.attribution.iter().map(|a| (a.name, a.loss, a.misfit)).collect()
+    }
+
+    /// Fall of the log likelihood where the robot is taken as exact.
+    #[getter]
+    fn robot_loss(&self) -> f64 {
+        self.inner.robot_loss
+    }
+
+    /// Information (n, n) at the mode under the working model.
+    #[getter]
+    fn information<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        convert::dynamic_out(py, &self.inner.information)
     }
 
     /// Linearisations, steps of the levels, and whether all came to rest.

@@ -2,9 +2,11 @@
 
 use handeye_core::error::Error;
 use handeye_core::imaging::Picture;
-use handeye_core::imaging::corner::{CornerFitter, CornerGuess, CornerKind};
+use handeye_core::imaging::corner::{Corner, CornerFitter, CornerGuess, CornerKind};
+use handeye_core::imaging::neighbours::{Crossing, neighbours};
 use handeye_core::imaging::spot::{Spot, area_centroid, free_gaps as core_free_gaps};
-use numpy::{PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2, PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::convert::{self, Array};
@@ -13,6 +15,7 @@ use crate::errors::to_python;
 /// Registers the functions of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fit_corners, module)?)?;
+    module.add_function(wrap_pyfunction!(crossing_neighbours, module)?)?;
     module.add_function(wrap_pyfunction!(area_centroids, module)?)?;
     module.add_function(wrap_pyfunction!(free_gaps, module)?)
 }
@@ -37,6 +40,14 @@ pub fn picture<'a, T: numpy::Element + Copy + Into<f32>>(
     Picture::new(grey, width, height).map_err(|e| to_python(py, e))
 }
 
+/// Places, covariances of them for residuals of one grey value, misfits and contrasts.
+type Fits<'py> = (
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+);
+
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "one array for each part of the guess")]
 fn fit_corners<'py>(
@@ -49,7 +60,7 @@ fn fit_corners<'py>(
     bands: Array<'py>,
     is_crossing: bool,
     rough: bool,
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+) -> PyResult<Fits<'py>> {
     let places = convert::vectors::<2>(py, "places", &places)?;
     let directions = convert::matrices::<2, 2>(py, "directions", &directions)?;
     let curvatures = convert::vectors::<2>(py, "curvatures", &curvatures)?;
@@ -66,11 +77,38 @@ fn fit_corners<'py>(
         radius: radii[i],
         band: bands[i],
     });
-    let found = py.detach(|| {
+    let found: Vec<Option<Corner>> = py.detach(|| {
         let mut fitter = CornerFitter::new(picture, kind);
-        guesses.flat_map(|guess| fitter.fit(&guess, rough).unwrap_or([f64::NAN; 2])).collect()
+        guesses.map(|guess| fitter.fit(&guess, rough)).collect()
     });
-    Ok(convert::array(py, &[n, 2], found))
+    let place = |c: &Option<Corner>| c.map_or([f64::NAN; 2], |c| c.place);
+    let spread = |c: &Option<Corner>| c.map_or([[f64::NAN; 2]; 2], |c| c.spread).into_iter().flatten();
+    Ok((
+        convert::array(py, &[n, 2], found.iter().flat_map(place).collect()),
+        convert::array(py, &[n, 2, 2], found.iter().flat_map(spread).collect()),
+        convert::array(py, &[n], found.iter().map(|c| c.map_or(f64::NAN, |c| c.misfit)).collect()),
+        convert::array(py, &[n], found.iter().map(|c| c.map_or(f64::NAN, |c| c.contrast)).collect()),
+    ))
+}
+
+#[pyfunction]
+fn crossing_neighbours<'py>(
+    py: Python<'py>,
+    places: Array<'py>,
+    angles: Array<'py>,
+    off: f64,
+) -> PyResult<Bound<'py, PyArray2<i64>>> {
+    let places = convert::vectors::<2>(py, "places", &places)?;
+    let angles = convert::vectors::<2>(py, "angles", &angles)?;
+    same_length(py, &[places.len(), angles.len()])?;
+    let crossings: Vec<_> = places
+        .iter()
+        .zip(&angles)
+        .map(|(place, angles)| Crossing { place: (*place).into(), angles: (*angles).into() })
+        .collect();
+    let found = py.detach(|| neighbours(&crossings, off));
+    let number = |ray: Option<usize>| ray.and_then(|i| i64::try_from(i).ok()).unwrap_or(-1);
+    Ok(Array2::from_shape_fn((found.len(), 4), |(i, k)| number(found[i][k])).into_pyarray(py))
 }
 
 type Spots<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>);

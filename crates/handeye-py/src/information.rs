@@ -5,18 +5,19 @@ use handeye_core::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, ToolPoint, Trace,
 };
 use handeye_core::information::{
-    Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, Supposition, Visibility,
+    Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, RobotError, Supposition,
+    Visibility,
 };
-use handeye_core::least_squares::{PixelParameters, Side};
+use handeye_core::least_squares::PixelParameters;
 use handeye_core::simd::VectorUnit;
-use nalgebra::{DMatrix, Matrix6};
+use nalgebra::DMatrix;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::camera::{camera, features};
 use crate::convert::{self, Array};
 use crate::errors::{invalid, to_python};
-use crate::model::{jacobian_list, side, square};
+use crate::model::{jacobian_list, square};
 
 /// Registers the classes of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -140,21 +141,16 @@ fn vector_unit(py: Python<'_>, name: &str) -> PyResult<VectorUnit> {
         })
 }
 
-/// Weight, belief, and side and root of the robot's error.
-type Supposed<'py> = (f64, Bound<'py, Belief>, Option<String>, Option<Array<'py>>);
+/// Weight, belief, and roots of the robot's error on the left and on the right.
+type Supposed<'py> = (f64, Bound<'py, Belief>, Option<Array<'py>>, Option<Array<'py>>);
+/// Roots `(N, 6, r)` of the noise of the joints, and columns `(N, 6, k)` of the arm's constants, per candidate.
+type ArmOfCandidates<'py> = (Array<'py>, Array<'py>);
 
-fn robot(
-    py: Python<'_>,
-    robot_side: Option<&str>,
-    robot_root: Option<&Array<'_>>,
-) -> PyResult<Option<(Side, Matrix6<f64>)>> {
-    match (robot_side, robot_root) {
-        (None, None) => Ok(None),
-        (Some(name), Some(root)) => {
-            Ok(Some((side(py, name)?, convert::matrix::<6, 6>(py, "robot_root", root)?)))
-        }
-        _ => Err(invalid(py, "robot_side and robot_root go together")),
-    }
+fn robot(py: Python<'_>, left: Option<&Array<'_>>, right: Option<&Array<'_>>) -> PyResult<RobotError> {
+    let root = |name: &str, root: Option<&Array<'_>>| {
+        root.map(|root| convert::matrix::<6, 6>(py, name, root)).transpose()
+    };
+    Ok(RobotError { left: root("robot_left", left)?, right: root("robot_right", right)? })
 }
 
 /// Predicts what candidate views would tell.
@@ -165,32 +161,37 @@ pub struct Predictor {
     y: handeye_core::se3::Se3,
     features: Vec<handeye_core::camera::Feature>,
     pixel_sigma: f64,
-    robot: Option<(Side, Matrix6<f64>)>,
+    robot: RobotError,
     pixel_parameters: Option<PixelParameters>,
-    free_joints: Vec<usize>,
-    joint_noise: Option<Vec<f64>>,
+    kinematic_count: usize,
     visibility: Visibility,
 }
 
 impl Predictor {
-    /// What the joints of each candidate do, out of `(N, 6, n)`.
+    /// What the arm of each candidate does.
     fn joints(
         &self,
         py: Python<'_>,
-        jacobians: Option<Array<'_>>,
+        arm: Option<ArmOfCandidates<'_>>,
         count: usize,
     ) -> PyResult<Option<Vec<CandidateJoints>>> {
-        let Some(jacobians) = jacobians else { return Ok(None) };
-        let jacobians = jacobian_list(py, &jacobians)?;
-        let noise = self.joint_noise.as_deref();
-        let fits = jacobians.len() == count
-            && jacobians.iter().all(|d| {
-                self.free_joints.iter().all(|i| *i < d.ncols()) && noise.is_none_or(|n| n.len() == d.ncols())
-            });
+        let Some((roots, constants)) = arm else { return Ok(None) };
+        let (roots, constants) = (jacobian_list(py, &roots)?, jacobian_list(py, &constants)?);
+        let fits = roots.len() == count
+            && constants.len() == count
+            && constants.iter().all(|c| c.ncols() == self.kinematic_count);
         if !fits {
-            return Err(invalid(py, "joint Jacobians: as many as motions, with a column for every joint"));
+            return Err(invalid(py, "the arm of candidates: as many as motions, with a column per constant"));
         }
-        Ok(Some(jacobians.iter().map(|d| CandidateJoints::new(d, &self.free_joints, noise)).collect()))
+        let joined = roots.into_iter().zip(constants);
+        Ok(Some(
+            joined
+                .map(|(root, constants)| CandidateJoints {
+                    constants,
+                    noise_root: (root.ncols() > 0).then_some(root),
+                })
+                .collect(),
+        ))
     }
 
     /// Gains in lanes; `threads` and `vector_unit` as Python gives them.
@@ -231,7 +232,7 @@ impl Predictor {
             pixel_sigma: self.pixel_sigma,
             robot: self.robot,
             pixel_parameters: self.pixel_parameters.as_ref(),
-            kinematic_count: self.free_joints.len(),
+            kinematic_count: self.kinematic_count,
             visibility: self.visibility,
         }
     }
@@ -241,9 +242,8 @@ impl Predictor {
 impl Predictor {
     #[new]
     #[pyo3(signature = (
-        lens, parameters, points, radii, x, y, *, pixel_sigma, robot_side=None, robot_root=None,
-        free_camera=None, board_scale=false, free_joints=None, joint_noise=None, image_size=None, margin_px=0.0,
-        fewest=3,
+        lens, parameters, points, radii, x, y, *, pixel_sigma, robot_left=None, robot_right=None,
+        free_camera=None, board_scale=false, kinematic_count=0, image_size=None, margin_px=0.0, fewest=3,
     ))]
     #[expect(clippy::too_many_arguments, reason = "one keyword per assumption")]
     fn new<'py>(
@@ -255,12 +255,11 @@ impl Predictor {
         x: Array<'py>,
         y: Array<'py>,
         pixel_sigma: f64,
-        robot_side: Option<&str>,
-        robot_root: Option<Array<'py>>,
+        robot_left: Option<Array<'py>>,
+        robot_right: Option<Array<'py>>,
         free_camera: Option<Vec<usize>>,
         board_scale: bool,
-        free_joints: Option<Vec<usize>>,
-        joint_noise: Option<Vec<f64>>,
+        kinematic_count: usize,
         image_size: Option<(f64, f64)>,
         margin_px: f64,
         fewest: usize,
@@ -268,7 +267,7 @@ impl Predictor {
         if !(pixel_sigma > 0.0 && pixel_sigma.is_finite()) {
             return Err(invalid(py, "pixel_sigma must be positive"));
         }
-        let robot = robot(py, robot_side, robot_root.as_ref())?;
+        let robot = robot(py, robot_left.as_ref(), robot_right.as_ref())?;
         let free = free_camera.unwrap_or_default();
         let count = free.len() + usize::from(board_scale);
         let pixel_parameters = (count > 0).then_some(PixelParameters { camera: free, board_scale });
@@ -280,8 +279,7 @@ impl Predictor {
             pixel_sigma,
             robot,
             pixel_parameters,
-            free_joints: free_joints.unwrap_or_default(),
-            joint_noise,
+            kinematic_count,
             visibility: Visibility { image: image_size.map(|(w, h)| [w, h]), margin_px, fewest },
         })
     }
@@ -289,7 +287,7 @@ impl Predictor {
     /// Gain of each candidate motion; NaN where too little would be in sight.
     ///
     /// Results do not depend on `threads` (0: as many as pay off) and on `vector_unit` beyond rounding.
-    #[pyo3(signature = (belief, criterion, motions, *, jacobians=None, threads=0, vector_unit=None))]
+    #[pyo3(signature = (belief, criterion, motions, *, arm=None, threads=0, vector_unit=None))]
     #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
     fn gains<'py>(
         &self,
@@ -297,13 +295,13 @@ impl Predictor {
         belief: &Belief,
         criterion: &PyCriterion,
         motions: Array<'py>,
-        jacobians: Option<Array<'py>>,
+        arm: Option<ArmOfCandidates<'py>>,
         threads: usize,
         vector_unit: Option<&str>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        if jacobians.is_some() {
+        if arm.is_some() {
             let motions = convert::transforms(py, "motions", &motions)?;
-            let joints = self.joints(py, jacobians, motions.len())?.unwrap_or_default();
+            let joints = self.joints(py, arm, motions.len())?.unwrap_or_default();
             let criterion = criterion.inner.as_ref();
             let gains = py
                 .detach(|| self.model().gains_with_joints(&belief.inner, criterion, &motions, &joints))
@@ -314,8 +312,8 @@ impl Predictor {
         self.scored(py, &[supposed], criterion, &motions, (threads, vector_unit))
     }
 
-    /// Gain of each candidate motion, averaged over what the robot's error may be, each with its weight, belief, side
-    /// and root, in place of the predictor's own.
+    /// Gain of each candidate motion, averaged over what the robot's error may be, each with its weight, belief and
+    /// roots on both sides, in place of the predictor's own.
     #[pyo3(signature = (supposed, criterion, motions, *, threads=0, vector_unit=None))]
     fn mean_gains<'py>(
         &self,
@@ -328,8 +326,8 @@ impl Predictor {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let supposed = supposed
             .iter()
-            .map(|(weight, belief, side, root)| {
-                let robot = robot(py, side.as_deref(), root.as_ref())?;
+            .map(|(weight, belief, left, right)| {
+                let robot = robot(py, left.as_ref(), right.as_ref())?;
                 Ok(Supposition { weight: *weight, belief: &belief.get().inner, robot })
             })
             .collect::<PyResult<Vec<_>>>()?;
@@ -337,15 +335,15 @@ impl Predictor {
     }
 
     /// Information `(N, n, n)` of each candidate motion; zero where too little would be in sight.
-    #[pyo3(signature = (motions, *, jacobians=None))]
+    #[pyo3(signature = (motions, *, arm=None))]
     fn informations<'py>(
         &self,
         py: Python<'py>,
         motions: Array<'py>,
-        jacobians: Option<Array<'py>>,
+        arm: Option<ArmOfCandidates<'py>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let motions = convert::transforms(py, "motions", &motions)?;
-        let joints = self.joints(py, jacobians, motions.len())?;
+        let joints = self.joints(py, arm, motions.len())?;
         let model = self.model();
         let n = model.parameter_count();
         let all: Vec<DMatrix<f64>> = py.detach(|| {

@@ -12,7 +12,6 @@ mod closed_form;
 mod convert;
 mod errors;
 mod estimation;
-mod evidence;
 mod geometry;
 mod imaging;
 mod information;
@@ -29,7 +28,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     camera::register(module)?;
     closed_form::register(module)?;
     estimation::register(module)?;
-    evidence::register(module)?;
     geometry::register(module)?;
     kinematics::register(module)?;
     imaging::register(module)?;

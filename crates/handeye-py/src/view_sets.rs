@@ -1,6 +1,6 @@
 //! Evidence of sets of views, as a Python value.
 
-use handeye_core::evidence::{LinearisedView, NoiseLevel, ViewSets as CoreViewSets};
+use handeye_core::estimation::{LinearisedView, NoiseLevel, ViewSets as CoreViewSets};
 use handeye_core::least_squares::Side;
 use nalgebra::DVector;
 use numpy::PyArrayDyn;

@@ -1,15 +1,18 @@
 """What a camera must be able to do: take one picture."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from handeye.errors import InputError
-from handeye.types.arrays import FloatArray, IndexArray
+from handeye.errors import DeviceError, InputError
+from handeye.types.arrays import FloatArray, IndexArray, finite_array, index_array
 
 Grey = NDArray[np.uint8]
+# Code of what a driver returned that is no picture.
+BAD_FRAME = "bad_frame"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +58,30 @@ class Frame:
                 f"frame: shape {self.image.shape} of {self.image.dtype}, expected grey values of uint8",
                 code="wrong_shape",
             )
+
+
+def checked_frame(answer: object) -> Frame:
+    """Return what a driver answered if it is a frame, its points as arrays of numbers.
+
+    Raises
+    ------
+    DeviceError
+        It is none, or its points or its time are not what they should be.
+    """
+    if not isinstance(answer, Frame):
+        raise DeviceError(f"grab returns {type(answer).__name__}, expected Frame", code=BAD_FRAME)
+    time = answer.timestamp_s
+    if time is not None and not (isinstance(time, int | float) and math.isfinite(time)):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise DeviceError("frame: timestamp_s is no finite number", code=BAD_FRAME)
+    points = answer.points
+    if points is None:
+        return answer
+    try:
+        ids = index_array(points.point_ids, "frame: point_ids")
+        pixels = finite_array(points.pixels, (len(ids), 2), "frame: pixels")
+    except (InputError, AttributeError) as error:
+        raise DeviceError(str(error), code=BAD_FRAME) from error
+    return replace(answer, points=replace(points, point_ids=ids, pixels=pixels))
 
 
 @runtime_checkable

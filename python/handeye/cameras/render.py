@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handeye.errors import InputError
-from handeye.pattern import Mask, Pattern, pattern_of
+from handeye.pattern import Mask, Pattern
 from handeye.types import Camera, Pose, Target
 from handeye.types.arrays import FloatArray
 
@@ -62,7 +62,7 @@ class BoardRenderer:
     Raises
     ------
     InputError
-        A family of targets that cannot be drawn, or a background that is not of the camera's size.
+        A background that is not of the camera's size.
     """
 
     camera: Camera
@@ -77,7 +77,7 @@ class BoardRenderer:
             raise InputError(
                 f"background: shape {look.background.shape}, expected {(height, width)}", code="wrong_shape"
             )
-        self._pattern = pattern_of(self.target)
+        self._pattern = Pattern(self.target)
         span = self._pattern.high - self._pattern.low
         margin = 0.1 * float(span.max()) if look.margin_m is None else look.margin_m
         self._low, self._high = self._pattern.low - margin, self._pattern.high + margin

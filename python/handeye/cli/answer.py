@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
@@ -31,7 +32,8 @@ def json_text(data: Mapping[str, Any]) -> str:
 
     JSON knows neither NaN nor infinity: both become null.
     """
-    return _text(data, "") + "\n"
+    # Half of a surrogate pair, as in names that are no UTF-8, cannot be written but as an escape.
+    return re.sub(r"[\ud800-\udfff]", lambda half: f"\\u{ord(half[0]):04x}", _text(data, "")) + "\n"
 
 
 def _text(value: object, indent: str) -> str:

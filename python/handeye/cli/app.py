@@ -11,6 +11,7 @@ COMMANDS = (
     ("import", "handeye.cli.importing:import_folder", "Turn images and robot poses into a recording."),
     ("export", "handeye.cli.export:export", "Write the answer in the format of another program."),
     ("report", "handeye.cli.report:report", "Write one page about a calibration."),
+    ("detect", "handeye.cli.detect:detect_in", "Say what is seen in each picture, and draw it."),
     ("target", "handeye.cli.target:target", "Write a calibration target to print."),
     ("demo", "handeye.cli.demo:demo", "Show what choosing views is worth."),
     ("study", "handeye.cli.study:study", "Compare policies and models on public data."),

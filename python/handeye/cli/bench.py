@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
-from handeye.cli.options import Common
+from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_folder, write_json
 from handeye.cli.progress import progress
 
@@ -22,7 +22,7 @@ def bench(
     budget_s: float = 0.4,
     no_peers: Annotated[bool, Parameter(show_default=False)] = False,
     quick: Annotated[bool, Parameter(show_default=False)] = False,
-    seed: int = 0,
+    seed: Seed = 0,
     output: Path | None = None,
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:

@@ -2,6 +2,7 @@
 
 import contextlib
 import difflib
+import io
 import os
 import shlex
 import sys
@@ -14,7 +15,7 @@ from cyclopts import CycloptsError
 from handeye.cli.answer import Answer, json_text
 from handeye.cli.app import COMMANDS, make_app
 from handeye.cli.failures import UnexpectedError, UsageError, WarnedError
-from handeye.errors import ExitCode, HandeyeError, InputError, UnstatedError
+from handeye.errors import ExitCode, HandeyeError, InputError, OutputError, UnstatedError
 
 REPORT = (
     "This is a mistake in handeye. Please report it with the command, what --debug prints, and the version."
@@ -26,9 +27,11 @@ def run(arguments: Sequence[str]) -> int:
     # Looked for by hand: they must hold even where the rest of the line cannot be understood.
     options = list(arguments)[: list(arguments).index("--")] if "--" in arguments else list(arguments)
     as_json, debug = "--json" in options, "--debug" in options
+    _show_what_can_be_shown()
     try:
-        if next(iter(arguments), "") == "help":
-            arguments = [*arguments[1:2], "--help"]
+        arguments = _asked_for_help(arguments)
+        if sys.stdout is None:  # pyright: ignore[reportUnnecessaryComparison] - closed by the caller
+            raise OutputError("the standard output is closed", hint="give the command one")
         app = make_app(next(iter(arguments), ""))
         answer: Any = app(list(arguments), exit_on_error=False, print_error=False)
         if isinstance(answer, Answer):
@@ -56,8 +59,21 @@ def run(arguments: Sequence[str]) -> int:
             _complain(f"error: the output cannot be written: {(error.strerror or str(error)).lower()}")
             return ExitCode.OUTPUT
         return _fail(_unexpected(error), as_json=as_json, debug=debug)
-    except Exception as error:  # noqa: BLE001 - the boundary
+    except BaseException as error:  # noqa: BLE001 - the boundary; a panic of the core is no Exception
         return _fail(_unexpected(error), as_json=as_json, debug=debug)
+
+
+def _show_what_can_be_shown() -> None:
+    """Escape on output what its encoding lacks, such as names of files that are no UTF-8."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _asked_for_help(arguments: Sequence[str]) -> Sequence[str]:
+    """Return what is meant by `help` and `help COMMAND`; other arguments as they are."""
+    asked = next(iter(arguments), "") == "help"
+    return [*arguments[1:2], "--help"] if asked else arguments
 
 
 def _usage(error: CycloptsError, arguments: Sequence[str]) -> HandeyeError:
@@ -91,7 +107,7 @@ def _with_command(error: UnstatedError, arguments: Sequence[str]) -> HandeyeErro
     return InputError(error.message, code=error.code, hint=hint).with_traceback(error.__traceback__)
 
 
-def _unexpected(error: Exception) -> HandeyeError:
+def _unexpected(error: BaseException) -> HandeyeError:
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     return UnexpectedError(f"unexpected {text}", hint=REPORT).with_traceback(error.__traceback__)
 
@@ -102,11 +118,11 @@ def _print(answer: Answer, *, as_json: bool) -> None:
         return
     from rich.console import Console  # noqa: PLC0415 - a program reading JSON need not wait for it
 
-    answer.show(Console(highlight=False))
+    answer.show(Console(highlight=False, markup=False))
 
 
 def _fail(error: HandeyeError, warnings: tuple[str, ...] = (), *, as_json: bool, debug: bool) -> int:
-    if as_json:
+    if as_json and sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison]
         described = {
             "code": error.code,
             "message": error.message,
@@ -129,6 +145,8 @@ def _fail(error: HandeyeError, warnings: tuple[str, ...] = (), *, as_json: bool,
 
 
 def _complain(text: str) -> None:
+    if sys.stderr is None:  # pyright: ignore[reportUnnecessaryComparison]
+        return  # print would take it to stdout
     with contextlib.suppress(OSError, ValueError):
         print(text, file=sys.stderr, flush=True)
 

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
-from handeye.cli.options import Common
+from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder, check_picture, write_figure
 from handeye.cli.progress import progress
 from handeye.datasets import read_recording
@@ -40,7 +40,7 @@ def demo(
     folder: Annotated[Path | None, Parameter(show_default=False)] = None,
     starts: Annotated[int | None, Parameter(show_default=False)] = None,
     points_only: Annotated[float | None, Parameter(show_default=False)] = None,
-    seed: int = 0,
+    seed: Seed = 0,
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Show what choosing views is worth: on a recording that comes with handeye, or with --cell on the move.

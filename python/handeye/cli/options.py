@@ -3,7 +3,10 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
+
+# Random numbers are drawn from whole numbers from zero on.
+Seed = Annotated[int, Parameter(validator=validators.Number(gte=0, lt=2**63))]
 
 
 @Parameter(name="*", group="Common")

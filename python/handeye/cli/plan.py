@@ -19,7 +19,8 @@ from handeye.cli.source import Source, mindful_of
 from handeye.datasets import read_poses
 from handeye.errors import InputError
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
-from handeye.solving import Estimate, Measurements, Sight, make_estimator
+from handeye.planning.prediction import Sight
+from handeye.solving import Estimate, Measurements, make_estimator
 from handeye.solving.initialize import check_views
 from handeye.types.calibration import MM_PER_M, ModelName
 

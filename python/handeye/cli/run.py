@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,36 +11,28 @@ from cyclopts import Parameter
 
 from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
-from handeye.cli.options import Common
+from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder
+from handeye.cli.run_options import Limits, Simulated, Timeouts
 from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
 from handeye.notations import SHOWN
 from handeye.planning.collisions import Body
 from handeye.planning.constraints import ViewLimits
+from handeye.robots import open_arm
 from handeye.robots.manual import describe
 from handeye.robots.protocol import Goal
-from handeye.session.attempt import Patience
-from handeye.session.configuration import (
-    SIMULATED,
-    Collisions,
-    Configuration,
-    Prepared,
-    Simulation,
-    begin,
-    go_on,
-    prepare,
-)
+from handeye.session.configuration import Prepared, begin, go_on, prepare
 from handeye.session.deciding import START_VIEWS, EndReason
 from handeye.session.drivers import REPLAY, Person
 from handeye.session.entry import Entry
-from handeye.session.faults import FaultRates
+from handeye.session.journal import read_settings
 from handeye.session.loop import End, Session
 from handeye.session.request import reach
-from handeye.session.simulated import usual_errors
+from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
-from handeye.session.store import SessionStore, read_settings
+from handeye.session.store import SessionStore
 from handeye.solving import Estimate
 from handeye.types import Mounting
 from handeye.types.calibration import MM_PER_M, ModelName
@@ -50,62 +42,6 @@ if TYPE_CHECKING:
 
 Corner = tuple[float, float, float]
 DEFAULT_ARM = "epson_c4l"
-
-
-@Parameter(name="*", group="Limits of motion and views")
-@dataclass(frozen=True)
-class Limits:
-    """What no motion and no view may leave."""
-
-    workspace_mm: tuple[float, float, float, float, float, float] | None = None
-    """Box that the flange may move in, in the frame of the base: least x y z, largest x y z. Needed to move
-    a real arm."""
-    floor_mm: float = 0.0
-    """Height of table or floor in that frame."""
-    speed_deg_s: float = 30.0
-    """No joint moves faster."""
-    distance_mm: tuple[float, float] = (250.0, 900.0)
-    """Nearest and farthest distance from camera to target."""
-    tilt_deg: float = 45.0
-    """Largest angle at which the target is seen."""
-    margin_px: float = 20.0
-    """Distance from the border of the image."""
-    collisions: Collisions = Collisions.AUTO
-    """How links are kept from touching one another: meshes (the shapes of the URDF, with the extra meshes),
-    capsules, or auto for meshes where there are any."""
-
-
-@Parameter(name="*", group="Simulated cell")
-@dataclass(frozen=True)
-class Simulated:
-    """What is wrong in the simulated cell."""
-
-    arm_errors: float = 1.0
-    """Factor on the arm's usual errors; 0 is an exact arm."""
-    blur_px: float = 0.6
-    """Blur of the pictures."""
-    pixel_noise: float = 2.0
-    """Noise of the pictures, in grey values."""
-    points_only: float | None = None
-    """Project points with so much noise (px) instead of rendering and detecting: faster."""
-    faults: float = 0.0
-    """Share of attempts that each kind of fault of robot and camera befalls."""
-
-    def simulation(self) -> Simulation:
-        """Return it as the library takes it."""
-        usual = usual_errors()
-        scaled = type(usual)(**{name: value * self.arm_errors for name, value in vars(usual).items()})
-        rates = None
-        if self.faults > 0:
-            rates = FaultRates(**dict.fromkeys(vars(FaultRates()), self.faults))
-        return Simulation(
-            scaled,
-            rates,
-            blur_px=self.blur_px,
-            pixel_noise=self.pixel_noise,
-            points_only=self.points_only,
-            hang_s=3.0,
-        )
 
 
 def run(
@@ -120,16 +56,17 @@ def run(
     accuracy_mm: float = 0.5,
     accuracy_deg: float = 0.05,
     max_views: int = 20,
-    seed: int = 0,
+    seed: Seed = 0,
     model: ModelName = ModelName.AUTO,
     policy: str = "next_best_view",
     refine: bool = True,
     resume: bool = False,
     dry_run: bool = False,
     confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
-    limits: Limits = Limits(),
-    simulated: Simulated = Simulated(),
-    common: Common = Common(),  # noqa: B008 - frozen
+    limits: Limits = Limits(),  # noqa: B008 - frozen, like those below
+    timeouts: Timeouts = Timeouts(),  # noqa: B008
+    simulated: Simulated = Simulated(),  # noqa: B008
+    common: Common = Common(),  # noqa: B008
 ) -> Answer:
     """Drive the arm from view to view until the accuracy asked for is reached.
 
@@ -143,8 +80,8 @@ def run(
     session
         Folder to write; a new one, or with --resume the one to go on with.
     robot
-        Description of the arm: a shipped arm (epson_c4l, ur5e, lbr_iiwa_14), a URDF or an MJCF file. Without
-        one epson_c4l, or in a replay none.
+        Description of the arm: a shipped arm (epson_c4l, ur5e, lbr_iiwa_14), a URDF or an MJCF file. Needed
+        for a real arm; a simulated one is epson_c4l without it, and a replay does without.
     driver
         What moves it: simulated, manual (a person; manual:kuka for another notation), replay:FOLDER (nothing;
         the views of a recording are the candidates), or a driver of another package with its address.
@@ -191,9 +128,9 @@ def run(
         )
     if replays:
         driver = f"{REPLAY}:{Path(driver.partition(':')[2]).resolve()}"
-        robot = None if robot is None else _described(robot)
-    else:
-        robot = _described(robot or DEFAULT_ARM)
+    elif robot is None and driver == SIMULATED:
+        robot = DEFAULT_ARM
+    robot = None if robot is None else _described(robot)
     if images is None:
         images = REPLAY if replays else SIMULATED
     configuration = Configuration(
@@ -217,7 +154,7 @@ def run(
             float(np.deg2rad(limits.tilt_deg)),
             limits.margin_px,
         ),
-        patience=Patience(grab_s=2.0) if driver == SIMULATED and simulated.faults > 0 else _patience(driver),
+        patience=timeouts.patience(driver, images),
         simulation=simulated.simulation(),
     )
     if (driver == SIMULATED) != (images == SIMULATED):
@@ -250,7 +187,7 @@ def _driven(loop: Session, store: SessionStore, prepared: Prepared) -> End:
 
 
 def _resumed(session: Path, person: Person, confirm: bool | None, *, as_json: bool) -> Answer:
-    configuration = Configuration.from_dict(read_settings(session).get("configuration"))
+    configuration = Configuration.from_dict(read_settings(session).asked.get("configuration"))
     loop, store, prepared = go_on(
         session,
         None if as_json else _Progress(),
@@ -274,11 +211,6 @@ def _box(
     return (x0, y0, z0), (x1, y1, z1)
 
 
-def _patience(driver: str) -> Patience:
-    # A person takes the time that a person takes.
-    return Patience(move_s=3600.0, read_s=600.0, grab_s=600.0) if driver.startswith("manual") else Patience()
-
-
 def _person() -> Person:
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
@@ -296,12 +228,14 @@ def _person() -> Person:
 def _confirm(wanted: bool | None, configuration: Configuration, person: Person) -> Any:  # noqa: ANN401
     """Return what asks before a motion; by default on real arms, but not where a person moves it anyway."""
     if wanted is None:
-        wanted = not configuration.is_simulated and not configuration.driver.startswith(("manual", "replay"))
+        wanted = not (configuration.is_simulated or configuration.by_hand or configuration.is_replay)
     if not wanted:
         return None
 
+    sliding = () if configuration.robot is None else open_arm(configuration.robot).sliding
+
     def confirm(goal: Goal) -> bool:
-        person.tell(describe(goal, SHOWN[:1]))
+        person.tell(describe(goal, SHOWN[:1], sliding))
         try:
             return person.ask("move there? [y/N] ").strip().lower() in {"y", "yes"}
         except EOFError:
@@ -364,7 +298,9 @@ def _plan(prepared: Prepared) -> Answer:
             f"probability, at most {wish.most_views} views.\n"
         )
         for goal in goals:
-            console.print(describe(goal), markup=False)
+            # Nobody has told which posture it is: joints of another one would be a trap.
+            known = goal if start.posture_known else replace(goal, joints_rad=None)
+            console.print(describe(known, SHOWN, prepared.arm.sliding), soft_wrap=True)
 
     return Answer(data, show)
 
@@ -372,7 +308,7 @@ def _plan(prepared: Prepared) -> Answer:
 def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end: End) -> Answer:
     hint = f"handeye run --resume --session {folder} goes on"
     report = None if end.calibration is None else _report(folder, configuration.model)
-    if end.reason is EndReason.TOO_MANY_FAILURES:
+    if end.reason in {EndReason.TOO_MANY_FAILURES, EndReason.ROBOT_HANGS}:
         raise DeviceError(end.sentence, code=end.reason, hint=hint)
     if end.reason is EndReason.NO_START:
         raise DetectionError(end.sentence, code=end.reason, hint=hint)

@@ -20,17 +20,51 @@ from handeye.types import Chessboard, Mounting, Target
 
 @Parameter(name="*", group="What the files leave open")
 @dataclass(frozen=True)
-class Source:
-    """What the files of a folder may leave open; a recording of ours leaves nothing open but the camera."""
+class Board:
+    """The calibration target, where the files do not say."""
 
     rows: int | None = None
-    """Rows of inner corners of the chessboard."""
+    """Rows of inner corners of a chessboard."""
     columns: int | None = None
-    """Columns of inner corners of the chessboard."""
+    """Columns of inner corners of a chessboard."""
     pitch_mm: float | None = None
     """Side of its squares, where the files do not say."""
     target: Path | None = None
-    """Target of any family, in TOML or JSON with the fields of [target] in a recording."""
+    """Any other board (ChArUco, AprilGrid, ArUco, circles): the file that `handeye target` writes."""
+
+    def described(self) -> tuple[Target | None, tuple[int, int] | None]:
+        """Return the target, or rows and columns of a chessboard whose squares the files describe.
+
+        Raises
+        ------
+        UsageError
+            Half a pattern, or a pattern and a target.
+        InputError
+            A file of a target that cannot be used.
+        """
+        if self.target is not None:
+            if (self.rows, self.columns, self.pitch_mm) != (None, None, None):
+                raise UsageError(
+                    "--target describes the whole target", hint="do not give --rows, --columns or --pitch-mm"
+                )
+            return read_target(self.target), None
+        if self.rows is None or self.columns is None:
+            if (self.rows, self.columns, self.pitch_mm) != (None, None, None):
+                raise UsageError(
+                    "--rows and --columns go together",
+                    hint="count inner corners of the chessboard, not squares; other boards: --target",
+                )
+            return None, None
+        if self.pitch_mm is None:
+            return None, (self.rows, self.columns)
+        return Chessboard(self.rows, self.columns, self.pitch_mm / 1000), None
+
+
+@Parameter(name="*", group="What the files leave open")
+@dataclass(frozen=True)
+class Source(Board):
+    """What the files of a folder may leave open; a recording of ours leaves nothing open but the camera."""
+
     camera: Path | None = None
     """Camera: TOML or JSON of ours, ROS's camera_info, OpenCV's FileStorage, Kalibr, RealSense, Open3D."""
     mounting: Mounting | None = None
@@ -55,7 +89,7 @@ class Source:
         InputError
             A file of a target or camera that cannot be used.
         """
-        target, pattern = self._target()
+        target, pattern = self.described()
         return SourceOptions(
             layout=self.layout,
             target=target,
@@ -86,21 +120,6 @@ class Source:
         if self.poses is not None or not (folder / FILE_NAME).is_file():
             return self
         return replace(self, notation=None, unit=None, poses_are=None)
-
-    def _target(self) -> tuple[Target | None, tuple[int, int] | None]:
-        if self.target is not None:
-            if (self.rows, self.columns, self.pitch_mm) != (None, None, None):
-                raise UsageError(
-                    "--target describes the whole target", hint="do not give --rows, --columns or --pitch-mm"
-                )
-            return read_target(self.target), None
-        if self.rows is None or self.columns is None:
-            if (self.rows, self.columns, self.pitch_mm) != (None, None, None):
-                raise UsageError("--rows and --columns go together", hint="count inner corners, not squares")
-            return None, None
-        if self.pitch_mm is None:
-            return None, (self.rows, self.columns)
-        return Chessboard(self.rows, self.columns, self.pitch_mm / 1000), None
 
     def open_any(self, folder: Path) -> Opened | PosePairs:
         """Read a folder or a file, also one that holds poses of the target instead of pictures.

@@ -7,6 +7,7 @@ from typing import Any
 from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from handeye.cli.wording import figures, heading, pairs
 
@@ -33,7 +34,7 @@ def show_policies(
         table.add_column(f"mean ({unit})", justify="right")
         table.add_column("median", justify="right")
     for name, part in parts.items():
-        table.add_row(f"[bold]{name}[/bold]")
+        table.add_row(Text(name, style="bold"))
         for policy, found in part["policies"].items():
             cells = [figures(found[metric][what]) for metric, _ in metrics for what in ("mean", "median")]
             table.add_row(_indented(policy), *cells)
@@ -75,7 +76,7 @@ def show_curves(console: Console, name: str, part: Mapping[str, Any]) -> None:
     for metric in first:
         quantity, _, unit = metric.rpartition("_")
         title = f"{quantity.replace('_', ' ')} ({unit})" if quantity else metric
-        table.add_row(f"[bold]{title}[/bold]")
+        table.add_row(Text(title, style="bold"))
         for policy, found in policies.items():
             table.add_row(_indented(policy), *(figures(value) for value in found[metric]))
         table.add_section()

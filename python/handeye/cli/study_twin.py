@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from handeye.cli.answer import Answer
-from handeye.cli.options import Common
+from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
 from handeye.cli.study import Trials, write_results
@@ -31,7 +31,7 @@ def twin(
     trials: int = 10,
     models: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = (),
     render: bool = False,
-    seed: int = 0,
+    seed: Seed = 0,
     workers: Annotated[int | None, Parameter(show_default=False)] = None,
     scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
     checkpoint: Path | None = None,
@@ -100,6 +100,7 @@ def twin(
 def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> None:
     from rich import box  # noqa: PLC0415 - JSON need not wait for it
     from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
 
     from handeye.cli import study_tables as tables  # noqa: PLC0415
     from handeye.cli.wording import figures, heading  # noqa: PLC0415
@@ -116,7 +117,7 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
     for _, unit in _COLUMNS:
         table.add_column(unit, justify="right")
     for model, part in document["models"].items():
-        table.add_row(f"[bold]{model}[/bold]")
+        table.add_row(Text(model, style="bold"))
         for policy, found in part["policies"].items():
             cells = [figures(found[metric]["mean"]) for metric, _ in _COLUMNS]
             table.add_row("  " + policy.replace("_", " "), *cells)

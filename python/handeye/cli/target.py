@@ -14,21 +14,11 @@ from handeye.datasets import read_target
 from handeye.datasets.reading import located
 from handeye.datasets.writing import replace_file
 from handeye.errors import InputError, OutputError
-from handeye.printing import BOARDS, Measures, Paper, Sheet, board_of, largest, lay_out, page, target_file
+from handeye.printing import Paper, Sheet, largest, lay_out, page, target_file
 from handeye.types import Target
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-_COMMON = frozenset({"rows", "columns"})
-# The measure that the others of a family follow, and what else can be asked of it.
-_SCALES = {"chessboard": "pitch_mm", "circle_grid": "pitch_mm", "charuco": "square_mm", "aprilgrid": "tag_mm"}
-_OWN = {
-    "chessboard": frozenset[str](),
-    "circle_grid": frozenset({"diameter_mm", "asymmetric", "marked", "marked_diameter_mm"}),
-    "charuco": frozenset({"marker_mm", "dictionary"}),
-    "aprilgrid": frozenset({"spacing_ratio", "border_bits", "dictionary"}),
-}
 
 
 @Parameter(name="*", group="Measures")
@@ -37,7 +27,7 @@ class Asked:
     """Measures of the target; what is not given is chosen, lengths as large as the paper allows."""
 
     rows: int | None = None
-    """Rows of inner corners (chessboard), circles, squares (charuco) or tags."""
+    """Rows of inner corners (chessboard), circles, squares (charuco), tags or markers."""
     columns: int | None = None
     """Columns of the same."""
     pitch_mm: float | None = None
@@ -45,15 +35,27 @@ class Asked:
     square_mm: float | None = None
     """charuco: side of a square."""
     marker_mm: float | None = None
-    """charuco: side of a marker; three quarters of a square if not given."""
+    """Side of a marker (aruco_grid, aruco_marker, charuco: three quarters of a square if not given)."""
+    separation_mm: float | None = None
+    """aruco_grid: space between markers; a quarter of their side if not given."""
     tag_mm: float | None = None
     """aprilgrid: side of a tag."""
     spacing_ratio: float | None = None
     """aprilgrid: space between tags over their side; 0.3 if not given."""
     border_bits: int | None = None
-    """aprilgrid: width of the black border, 2 (as Kalibr prints) or 1."""
+    """Width of the markers' black border: 1, or 2 as Kalibr prints an aprilgrid."""
     dictionary: str | None = None
-    """charuco, aprilgrid: OpenCV's name of the markers."""
+    """OpenCV's name of the markers' dictionary."""
+    id: int | None = None
+    """aruco_marker: its number in the dictionary."""
+    first_id: int | None = None
+    """charuco, aprilgrid, aruco_grid: number of the first marker; the others follow."""
+    ids: str | None = None
+    """charuco, aprilgrid, aruco_grid: all numbers, with commas, where they do not follow: 3,7,12,..."""
+    inverted: bool = False
+    """Boards with markers: print light on dark."""
+    legacy_pattern: bool = False
+    """charuco: the layout of OpenCV before 4.6, another one if rows are even."""
     diameter_mm: float | None = None
     """circle_grid: diameter of a circle; half the pitch if not given."""
     asymmetric: bool = False
@@ -78,30 +80,36 @@ class Asked:
         InputError
             A measure out of its range, an unknown family, or nothing that fits on the paper.
         """
-        board = board_of(family)
-        known = _COMMON | _OWN[family] | {_SCALES[family]}
-        for name in sorted(self.given - known):
-            option = f"--{name.replace('_', '-')}"
-            others = ", ".join(f"--{other.replace('_', '-')}" for other in sorted(known))
-            raise UsageError(f"{option} says nothing about {family}", hint=f"it has {others}")
-        asked = Measures(
-            self.rows,
-            self.columns,
-            _metres(self.diameter_mm),
-            self.asymmetric,
-            self.marked,
-            _metres(self.marked_diameter_mm),
-            _metres(self.marker_mm),
-            self.dictionary,
-            self.spacing_ratio,
-            self.border_bits,
-        )
-        scale = _metres(getattr(self, _SCALES[family]))
-        return largest(family, asked, paper) if scale is None else board.usual(scale, asked)
+        member = Target.member(family)
+        asked: dict[str, Any] = {}
+        for name in sorted(self.given):
+            field = f"{name.removesuffix('_mm')}_m" if name.endswith("_mm") else name
+            if field not in member.fields():
+                option = f"--{name.replace('_', '-')}"
+                others = ", ".join(map(_option, member.fields()))
+                raise UsageError(f"{option} says nothing about {family}", hint=f"it has {others}")
+            value = getattr(self, name)
+            asked[field] = _metres(value) if field != name else _numbers(value) if name == "ids" else value
+        scale = asked.pop(member.scale, None)
+        return largest(family, asked, paper) if scale is None else member.usual(scale, asked)
 
 
-def _metres(millimetres: float | None) -> float | None:
-    return None if millimetres is None else round(millimetres / 1000, 12)
+def _option(field: str) -> str:
+    name = f"{field}m" if field.endswith("_m") else field
+    return f"--{name.replace('_', '-')}"
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError as error:
+        raise UsageError(
+            f"--ids {text[:40]!r}", hint="write whole numbers with commas, such as 3,7,12"
+        ) from error
+
+
+def _metres(millimetres: float) -> float:
+    return round(millimetres / 1000, 12)
 
 
 def target(
@@ -121,7 +129,8 @@ def target(
     Parameters
     ----------
     family
-        chessboard, circle_grid, charuco or aprilgrid; or the .toml or .json file of a target.
+        chessboard, circle_grid, charuco, aprilgrid, aruco_grid or aruco_marker; or the .toml or .json file of
+        a target.
     output
         The page, .pdf or .svg.
     paper
@@ -151,7 +160,7 @@ def target(
 
 def _target(family: str, measures: Asked, paper: Paper) -> Target:
     name = family.replace("-", "_")
-    if name in BOARDS or Path(family).suffix.lower() not in {".toml", ".json"}:
+    if name in Target.members or Path(family).suffix.lower() not in {".toml", ".json"}:
         return measures.target(name, paper)
     if measures != Asked():
         raise UsageError("the file says all measures", hint="give no measures, or name a family instead")

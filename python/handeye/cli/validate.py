@@ -9,7 +9,7 @@ import numpy as np
 
 from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
-from handeye.cli.options import Common
+from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_output, write_json
 from handeye.cli.progress import progress
 from handeye.cli.source import Source, mindful_of
@@ -30,7 +30,7 @@ def validate(
     *,
     model: ModelName = ModelName.AUTO,
     splits: int = 20,
-    seed: int = 0,
+    seed: Seed = 0,
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary

@@ -15,12 +15,17 @@ from handeye.errors import InputError
 MAX_BYTES = 512 * MIB
 # Twice the largest cameras of industry; decoded, one grey value each.
 MAX_PIXELS = 1 << 28
+# A camera's picture has no more pixels than this for each byte of its file. Smaller ones than `ALWAYS_PIXELS`
+# may: they cannot fill the memory.
+PIXELS_PER_BYTE, ALWAYS_PIXELS = 100, 1 << 24
+# A progressive JPEG has about ten scans; each costs as much as decoding the whole picture.
+MAX_SCANS = 100
 _TIFF_WIDTH, _TIFF_HEIGHT = 256, 257
 _FLAGS = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
-    """Return the grey values (H, W) of a PNG, JPEG, BMP or TIFF file.
+    """Return the grey values (H, W) of an image: PNG, JPEG, BMP, TIFF, PGM, WebP and what else OpenCV reads.
 
     Colour becomes grey. 10, 12 and 14 bits kept in 16 are told by the brightest pixel and scaled to 8 by the
     same power of two. An orientation noted in the file is ignored: pixels are those of the sensor.
@@ -40,6 +45,19 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     if width * height > MAX_PIXELS:
         raise InputError(
             f"{path}: {width} x {height} pixels, expected at most {MAX_PIXELS}", code="too_large"
+        )
+    if width * height > max(ALWAYS_PIXELS, PIXELS_PER_BYTE * len(content)):
+        raise InputError(
+            f"{path}: {width} x {height} pixels in {len(content)} bytes, which no camera's picture has",
+            code="too_large",
+            hint="check what this file is",
+        )
+    scans = content.count(b"\xff\xda") if path.suffix.lower() in {".jpg", ".jpeg"} else 1
+    if scans > MAX_SCANS:
+        raise InputError(
+            f"{path}: a JPEG image of {scans} scans, expected at most {MAX_SCANS}",
+            code="too_large",
+            hint="save the image again without progressive encoding",
         )
     try:
         image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), _FLAGS)
@@ -62,9 +80,10 @@ def _eight_bits(image: NDArray[np.integer[Any] | np.floating[Any]], path: Path) 
             code="not_an_image",
             hint="save the image with whole grey values",
         )
-    grey = image.astype(np.uint16)
-    bits = max(int(grey.max()).bit_length(), 8)
-    return (grey >> (bits - 8)).astype(np.uint8)
+    bits = max(int(image.max()).bit_length(), 8)
+    # In place: a large picture is in the memory once more, as bytes, and not three times.
+    np.right_shift(image, bits - 8, out=image)
+    return image.astype(np.uint8)
 
 
 def _damaged(path: Path, found: str) -> InputError:

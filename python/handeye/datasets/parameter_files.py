@@ -14,7 +14,7 @@ from handeye.datasets.toml_reading import parse_toml
 from handeye.errors import InputError
 from handeye.types import Target
 
-MAX_BYTES = 4 * MIB
+MAX_BYTES = 2 * MIB
 
 
 def read_target(path: str | os.PathLike[str]) -> Target:

@@ -31,7 +31,7 @@ from handeye.types.view import check_view_name
 FORMAT = "handeye-recording"
 VERSION = 1
 FILE_NAME = "recording.toml"
-MAX_BYTES = 4 * MIB
+MAX_BYTES = 2 * MIB
 
 Rows = list[list[float]]
 
@@ -112,6 +112,49 @@ def read_recording(folder: str | os.PathLike[str]) -> LoadedRecording:
             source=document.source,
         )
     return LoadedRecording(recording, root, recording_warnings(recording))
+
+
+@dataclass(frozen=True)
+class ViewsApart:
+    """A recording without its views, and each view by its name, or what is wrong with it."""
+
+    recording: Recording
+    views: dict[str, View | InputError]
+
+
+def read_views_apart(folder: str | os.PathLike[str]) -> ViewsApart:
+    """Read a recording of which single views may be damaged; its truth is left out.
+
+    Raises
+    ------
+    InputError
+        The recording cannot be read at all.
+    """
+    root = existing_folder(folder)
+    file = root / FILE_NAME
+    document = _read_document(file)
+    views: dict[str, View | InputError] = {}
+    with located(str(file)):
+        camera = Camera.from_dict(document.camera)
+        target = Target.from_dict(document.target)
+        recording = Recording(document.name, document.mounting, camera, target, (), source=document.source)
+        for view in document.view:
+            try:
+                views[check_view_name(view.name)] = _read_view(view, root, camera)
+            except InputError as error:
+                views[view.name] = error
+    return ViewsApart(recording, views)
+
+
+def write_empty_recording(recording: Recording, folder: Path) -> None:
+    """Write `recording.toml` alone, without views, into a folder that has lost its own.
+
+    Raises
+    ------
+    OutputError
+        The system refuses to write.
+    """
+    replace_file(folder / FILE_NAME, _text(recording.with_views(()), []))
 
 
 def write_recording(

@@ -37,7 +37,7 @@ PUBLISHED_PATTERNS = {
     "kuka_2": (17, 24),
 }
 _SQUARE_SIZE_FILE = re.compile(r"square[ _-]?size\.txt", re.IGNORECASE)
-_LENGTH = re.compile(r"([\d.]+)\s*(mm|cm|m)(?![a-z])", re.IGNORECASE | re.ASCII)
+_LENGTH = re.compile(r"(?<![\d.])([\d.]+)\s*(mm|cm|m)(?![a-z])", re.IGNORECASE | re.ASCII)
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _MAX_BYTES = 8 * MIB
 
@@ -191,7 +191,8 @@ def _target(
         raise InputError(
             f"{folder}: the number of corners of the chessboard is not in the files",
             code="pattern_unknown",
-            hint="give the pattern: rows and columns of inner corners",
+            hint="give --rows and --columns of inner corners, or --target FILE for any other board: "
+            "ChArUco, AprilGrid, ArUco markers, circles; handeye target writes such a file",
         )
     if square_m is None:
         raise InputError(

@@ -1,12 +1,19 @@
-"""Writing TOML that a person can read: a matrix has a line per row.
+"""TOML that a person can read: a matrix has a line per row; and reading what a stranger wrote.
 
 The common writers put every number on a line of its own.
 """
 
+import re
+import tomllib
 from collections.abc import Mapping
 from typing import Any, TypeGuard, cast
 
 Table = Mapping[str, Any]
+
+# A key of very many parts, a.a.a..., takes the reader of TOML a time that grows with their square.
+MAX_DOTS_IN_KEY = 30
+# Whole numbers of files fit 64 bits. Larger ones in hexadecimal Python may not even print.
+MAX_BITS = 64
 
 _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
@@ -29,6 +36,32 @@ def toml_text(document: Table) -> str:
         else:
             simple.append(_pair(key, value))
     return "\n".join([*simple, *tables, *lists_of_tables]) + "\n"
+
+
+def toml_values(text: str) -> dict[str, Any]:
+    """Return what a text in TOML holds, in a time that grows evenly with its length.
+
+    Raises
+    ------
+    ValueError
+        No TOML, a key of very many parts, or a whole number that does not fit 64 bits.
+    """
+    for number, line in enumerate(text.split("\n"), start=1):
+        if line.count(".") > MAX_DOTS_IN_KEY:
+            bare = re.sub(r"[\s\"']", "", line)
+            if max(part.count(".") for part in re.split(r"[,=\[\]{}]", bare)) > MAX_DOTS_IN_KEY:
+                raise ValueError(f"line {number}: a key or value with more than {MAX_DOTS_IN_KEY} dots")
+    document = tomllib.loads(text)
+    pending: list[Any] = [document]
+    while pending:
+        value = pending.pop()
+        if isinstance(value, dict):
+            pending += cast("dict[str, Any]", value).values()
+        elif _is_list(value):
+            pending += value
+        elif isinstance(value, int) and value.bit_length() > MAX_BITS:
+            raise ValueError(f"a whole number of {value.bit_length()} bits, expected at most {MAX_BITS}")
+    return document
 
 
 def _is_list(value: object) -> TypeGuard[list[Any]]:

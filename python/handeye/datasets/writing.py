@@ -6,6 +6,7 @@ Every file is on the disk before it gets its name. Whatever the system refuses b
 
 import errno
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Generator
@@ -16,6 +17,7 @@ from handeye.datasets.reading import reason
 from handeye.errors import OutputError
 
 _COPY_CHUNK = 1 << 20
+_PARTIAL = re.compile(r"\..{1,100}\.[0-9a-f]{12}\.partial", re.DOTALL)
 
 
 @contextmanager
@@ -112,6 +114,14 @@ def copy_file(source: Path, path: Path) -> None:
             except BaseException:
                 path.unlink(missing_ok=True)
                 raise
+
+
+def remove_partials(folder: Path) -> None:
+    """Remove files that were not written to their end, as a process that is gone left them."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if _PARTIAL.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
+                Path(entry.path).unlink(missing_ok=True)
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -2,7 +2,9 @@
 
 from handeye.detection.base import Detection, Image, NotFound, Reason, relabeled
 from handeye.detection.batch import Batch, DetectionCache, detect_all
+from handeye.detection.description import shown_board, without_lengths
 from handeye.detection.detect import detect
+from handeye.detection.drawing import drawn_over
 from handeye.detection.intrinsics import CameraCalibration, calibrate_camera
 from handeye.detection.predicted import Prediction
 
@@ -18,5 +20,8 @@ __all__ = [
     "calibrate_camera",
     "detect",
     "detect_all",
+    "drawn_over",
     "relabeled",
+    "shown_board",
+    "without_lengths",
 ]

@@ -1,7 +1,9 @@
 """What a detection is, and what a failure to detect says."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from handeye.errors import DetectionError, InputError
 from handeye.types import Target
 from handeye.types.arrays import FloatArray, IndexArray, finite_array, index_array
+from handeye.types.target import Coded
 
+_Board = TypeVar("_Board", bound=Target)
 Image = NDArray[np.uint8]
 """A grey picture (H, W)."""
 
@@ -25,6 +29,8 @@ class Detection:
     pixels
         (N, 2) where they are: u to the right, v down, pixel centres at whole numbers. A circle is where the
         area centroid of its image is, not the image of its centre.
+    note
+        What about the board is not as described, though its points are.
 
     Raises
     ------
@@ -34,8 +40,9 @@ class Detection:
 
     point_ids: IndexArray
     pixels: FloatArray
+    note: str
 
-    def __init__(self, point_ids: ArrayLike, pixels: ArrayLike) -> None:
+    def __init__(self, point_ids: ArrayLike, pixels: ArrayLike, note: str = "") -> None:
         ids = index_array(point_ids, "detection: point_ids")
         values = finite_array(pixels, (None, 2), "detection: pixels")
         if len(ids) == 0 or len(ids) != len(values) or len(np.unique(ids)) != len(ids):
@@ -46,6 +53,7 @@ class Detection:
             )
         object.__setattr__(self, "point_ids", ids)
         object.__setattr__(self, "pixels", values)
+        object.__setattr__(self, "note", note)
 
     def __len__(self) -> int:
         return len(self.point_ids)
@@ -60,8 +68,10 @@ class Reason(StrEnum):
     LOW_CONTRAST = "low_contrast"
     BLURRED = "blurred"
     WRONG_SIZE = "wrong_size"
+    OTHER_BOARD = "other_board"
     INCOMPLETE = "incomplete"
     INCONSISTENT = "inconsistent"
+    REPEATED = "repeated"
     NO_PATTERN = "no_pattern"
     DETECTOR_FAILED = "detector_failed"
 
@@ -73,8 +83,10 @@ _HINTS = {
     Reason.LOW_CONTRAST: "check the light and that the lens is open",
     Reason.BLURRED: "focus the lens, or let the arm come to rest before the picture is taken",
     Reason.WRONG_SIZE: "count rows and columns again: inner corners on a chessboard, circles on a grid",
+    Reason.OTHER_BOARD: "describe the board that is shown",
     Reason.INCOMPLETE: "bring the whole board into the image and nothing in front of it",
     Reason.INCONSISTENT: "check rows, columns and dictionary against the printed board",
+    Reason.REPEATED: "leave one of them in the picture, or give their markers other numbers",
     Reason.NO_PATTERN: "check that the board is in the image, whole, with a white margin, not too oblique",
     Reason.DETECTOR_FAILED: "look at the image; if it is in order, please report it",
 }
@@ -90,15 +102,21 @@ class NotFound:
         The likeliest cause.
     evidence
         What was seen, for a person.
+    shown
+        The board that the picture shows instead; lengths that it does not tell are those described.
+    advice
+        How to describe it; empty for what usually helps.
     """
 
     reason: Reason
     evidence: str
+    shown: Target | None = None
+    advice: str = ""
 
     @property
     def hint(self) -> str:
         """What to do about it."""
-        return _HINTS[self.reason]
+        return self.advice or _HINTS[self.reason]
 
     def error(self, name: str) -> DetectionError:
         """Return the error to raise where the image of this name was needed."""
@@ -107,7 +125,7 @@ class NotFound:
 
 def relabeled(detection: Detection, permutation: IndexArray) -> Detection:
     """Return the detection with point i called `permutation[i]`, as the symmetries of a target have it."""
-    return Detection(permutation[detection.point_ids], detection.pixels)
+    return replace(detection, point_ids=permutation[detection.point_ids])
 
 
 def ordered(target: Target, point_ids: ArrayLike, pixels: ArrayLike) -> Detection:
@@ -158,3 +176,16 @@ def is_mirrored(plane: FloatArray, pixels: FloatArray) -> bool:
     Both the plane of the target and the image have x to the right and y down.
     """
     return float(np.linalg.det(affine(plane, pixels)[0])) < 0
+
+
+def upright(image: Image, target: _Board) -> tuple[Image, _Board]:
+    """Return image and target as they are, in the negative where the target is printed light on dark."""
+    if not isinstance(target, Coded) or not target.inverted:
+        return image, target
+    return np.asarray(255 - image, dtype=np.uint8), _positive(target)
+
+
+@lru_cache(maxsize=16)
+def _positive(target: _Board) -> _Board:
+    """Return the target printed dark on light; the same object each time, for whatever is kept about it."""
+    return target.changed(inverted=False)

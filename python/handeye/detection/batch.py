@@ -1,13 +1,22 @@
 """Find a target in many images."""
 
 import hashlib
+import itertools
+import os
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from handeye.detection.base import Detection, Image, NotFound
 from handeye.detection.detect import VERSION, detect
 from handeye.errors import DetectionError, HandeyeError
 from handeye.types import Target
+
+# Images for each worker that are handed out before the first of them is done.
+WAITING = 4
 
 
 class DetectionCache:
@@ -18,7 +27,12 @@ class DetectionCache:
 
     def detect(self, image: Image, target: Target) -> Detection | NotFound:
         """As `handeye.detection.detect`, without doing the same work twice."""
-        key = (hashlib.blake2b(image.tobytes(), digest_size=16).digest(), image.shape, target, VERSION)
+        key = (
+            hashlib.blake2b(np.ascontiguousarray(image).data, digest_size=16).digest(),
+            image.shape,
+            target,
+            VERSION,
+        )
         if key not in self._found:
             self._found[key] = detect(image, target)
         return self._found[key]
@@ -66,32 +80,58 @@ def detect_all(
     *,
     progress: Callable[[str, Detection | HandeyeError], None] | None = None,
     cache: DetectionCache | None = None,
+    workers: int | None = None,
 ) -> Batch:
-    """Find the target in many images, one after the other; a failure stops nothing.
+    """Find the target in many images, side by side; a failure stops nothing.
+
+    What is found and the order in which it is reported depend neither on the number of workers nor on how
+    busy the machine is. Whatever `progress` raises, an interruption too, ends the work after the images that
+    are being looked at.
 
     Parameters
     ----------
     images
-        Names, and functions that give the image, called one at a time: no more than one is in memory.
+        Names, and functions that give the image, called by the workers: no more images than workers are in
+        memory.
     target
         What to look for.
     progress
-        Called after each image with its name and what came of it.
+        Called in the caller's thread after each image, in their order, with its name and what came of it.
     cache
         Remembers what was found before; a new one by default.
+    workers
+        Threads, at least one; by default one for each processor.
     """
     memory = DetectionCache() if cache is None else cache
+    count = max(1, workers or _processors())
     found: dict[str, Detection] = {}
     failed: dict[str, HandeyeError] = {}
-    for name, load in images:
-        outcome = _one(name, load, target, memory)
-        if isinstance(outcome, Detection):
-            found[name] = outcome
-        else:
-            failed[name] = outcome
-        if progress is not None:
-            progress(name, outcome)
+    waiting: deque[tuple[str, Future[Detection | HandeyeError]]] = deque()
+    pool = ThreadPoolExecutor(count, thread_name_prefix="detect")
+    try:
+        remaining = iter(images)
+        while True:
+            # Those that wait hold a name and a function, no image.
+            for name, load in itertools.islice(remaining, WAITING * count - len(waiting)):
+                waiting.append((name, pool.submit(_one, name, load, target, memory)))
+            if not waiting:
+                break
+            name, future = waiting.popleft()
+            outcome = future.result()
+            if isinstance(outcome, Detection):
+                found[name] = outcome
+            else:
+                failed[name] = outcome
+            if progress is not None:
+                progress(name, outcome)
+    finally:
+        pool.shutdown(cancel_futures=True)
     return Batch(found, failed)
+
+
+def _processors() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _one(

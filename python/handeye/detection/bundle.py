@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from handeye import _core
 from handeye.errors import DegenerateError, SolveError
 from handeye.types.arrays import FloatArray
+from handeye.types.pose import through_twist
 
 MAX_ITERATIONS = 200
 COST_TOLERANCE = 1e-13
@@ -59,8 +60,7 @@ class Bundle:
         for k, (pose, part) in enumerate(zip(self.poses, self._parts(), strict=True)):
             seen = self.points[part] @ pose[:3, :3].T + pose[:3, 3]
             _, d_point, d_parameters, _ = _core.project_jacobians(self.lens, self.parameters, seen)
-            # d (exp(xi) p) / d xi = [I, -[p]x], and row' [p]x = (row x p)', so row' (-[p]x) = (p x row)'.
-            G = np.concatenate([d_point, np.cross(seen[:, np.newaxis], d_point)], axis=2).reshape(-1, 6)
+            G = through_twist(seen, d_point).reshape(-1, 6)
             F = d_parameters.reshape(-1, n)
             r = residuals[part].ravel()
             blocks.U[:] += F.T @ F

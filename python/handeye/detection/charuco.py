@@ -1,5 +1,6 @@
 """Inner corners of a ChArUco board, each known by the markers beside it."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import cv2
@@ -16,14 +17,15 @@ from handeye.detection.base import (
 )
 from handeye.detection.corner_fit import FEW, WIDE_PX, CornerKind, astray, fit_corners, nearer, spread
 from handeye.detection.diagnosis import diagnose
+from handeye.detection.marker_lattice import beside
 from handeye.detection.markers import (
     LEAST_SHARE,
     Bits,
+    Seen,
     dictionary,
     disagreement,
-    foreign_markers,
+    from_neighbours,
     parameters,
-    unique,
 )
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import Charuco
@@ -35,49 +37,69 @@ FEWEST_MARKERS = 2
 # Part of a square that the window of a corner may take, and of the way to a marker that its strips may.
 WINDOW_SHARE = 0.7
 BAND_SHARE = 0.8
+# What the wrong one of two layouts looks like.
+_MAY_BE_LAYOUT = (Reason.INCONSISTENT, Reason.INCOMPLETE)
 
 
 @lru_cache(maxsize=16)
-def _board(target: Charuco) -> tuple[cv2.aruco.CharucoBoard, FloatArray]:
-    """Return OpenCV's board, and the corners (M, 4, 2) of its markers in the plane of the target."""
+def _board(target: Charuco) -> cv2.aruco.CharucoBoard:
+    """Return OpenCV's board."""
     board = cv2.aruco.CharucoBoard(
-        (target.columns, target.rows), target.square_m, target.marker_m, dictionary(target.dictionary)
+        (target.columns, target.rows),
+        target.square_m,
+        target.marker_m,
+        dictionary(target.dictionary),
+        target.marker_ids.astype(np.int32),
     )
     board.setLegacyPattern(target.legacy_pattern)
-    # OpenCV counts from the outer corner.
-    return board, np.asarray(board.getObjPoints(), dtype=np.float64)[:, :, :2] - target.square_m
+    return board
 
 
 @lru_cache(maxsize=16)
 def _bits(target: Charuco) -> Bits:
-    return Bits.of(target, _board(target)[1], target.dictionary, 1)
+    return Bits.of(target)
 
 
 def find(image: Image, target: Charuco) -> Detection | NotFound:
-    """Find the corners that are visible, at least four."""
-    board, places = _board(target)
-    detector = cv2.aruco.CharucoDetector(board, cv2.aruco.CharucoParameters(), parameters(1))
+    """Find the corners that are visible, at least four.
+
+    A board of an even number of rows has another layout since OpenCV 4.6, with the same corners: where the
+    one described is not there, the other is tried, and the detection says so.
+    """
+    found = _find(image, target)
+    if isinstance(found, Detection) or found.reason not in _MAY_BE_LAYOUT or target.rows % 2:
+        return found
+    other = replace(target, legacy_pattern=not target.legacy_pattern)
+    instead = _find(image, other)
+    if isinstance(instead, NotFound):
+        return found
+    since = "since OpenCV 4.6" if target.legacy_pattern else "of OpenCV before 4.6"
+    note = f"the board has the layout {since}: legacy_pattern = {str(other.legacy_pattern).lower()}"
+    return replace(instead, note=note)
+
+
+def _find(image: Image, target: Charuco) -> Detection | NotFound:
+    detector = cv2.aruco.CharucoDetector(
+        _board(target), cv2.aruco.CharucoParameters(), parameters(target.border_bits)
+    )
     found, found_ids, marker_corners, marker_ids = detector.detectBoard(image)
-    ids, seen = unique(marker_ids, marker_corners)
-    on_board = np.asarray(board.getIds()).ravel()
-    known = np.isin(ids, on_board)
-    against = disagreement(places[ids[known]], seen[known])
+    seen_markers = Seen.of(marker_ids, marker_corners)
+    of_board = seen_markers.of_board(target)
+    if isinstance(of_board, NotFound):
+        return of_board
+    markers, seen = of_board
+    if not len(markers):
+        return diagnose(image, NotFound(Reason.NO_PATTERN, f"no marker of the board, of {target.dictionary}"))
+    places = target.outlines[markers]
+    against = disagreement(places, seen) or beside(target, seen_markers)
     if against is not None:
         return against
-    if len(ids) >= FEWEST_CORNERS and known.mean() < 0.5:
-        return NotFound(
-            Reason.INCONSISTENT,
-            f"{(~known).sum()} of {len(ids)} markers have numbers that the board described does not have",
-        )
-    if not known.any():
-        other = foreign_markers(image, target.dictionary, 1)
-        return other or diagnose(image, NotFound(Reason.NO_PATTERN, f"no marker of {target.dictionary}"))
     # OpenCV gives None where it finds nothing, whatever its types say.
     number = 0 if found_ids is None else len(found_ids)  # pyright: ignore[reportUnnecessaryComparison]
     if number >= FEWEST_CORNERS:
         corners = np.asarray(found, dtype=np.float64).reshape(-1, 2)
         numbers = np.asarray(found_ids, dtype=np.int64).ravel()
-        steps = _steps(corners, places[ids[known]], seen[known])
+        steps = _steps(corners, places, seen)
         rough = _measured(image, target, corners, steps, rough=True)
         good = np.isfinite(rough).all(axis=1)
         numbers, rough = numbers[good], rough[good]
@@ -87,18 +109,25 @@ def find(image: Image, target: Charuco) -> Detection | NotFound:
         if lens is not None:
             rough = _measured(image, target, rough, lens.steps(plane, 0.1 * target.square_m))
         good = np.isfinite(rough).all(axis=1)
+        numbers, rough = numbers[good], rough[good]
+        # What lies in front of the board has edges, too: markers and corners around know better.
+        plane = np.concatenate([target.points[numbers, :2], places.reshape(-1, 2)])
+        around = np.concatenate([rough, seen.reshape(-1, 2)])
+        expected = from_neighbours(plane, around)[: len(rough)]
+        pitches = target.square_m * np.linalg.norm(_steps(rough, places, seen), axis=2).min(axis=1)
+        good = ~astray(rough, expected, pitches)
         number = int(good.sum())
         if number >= FEWEST_CORNERS:
             return ordered(target, numbers[good], rough[good])
     return NotFound(
         Reason.INCOMPLETE,
-        f"{number} of {target.point_count} corners by {known.sum()} markers; {FEWEST_CORNERS} are needed",
+        f"{number} of {target.point_count} corners by {len(markers)} markers; {FEWEST_CORNERS} are needed",
     )
 
 
 def confirm(image: Image, target: Charuco, board: Aligned) -> Detection | None:
     """Return the corners of a board that was found where it was expected; None unless it is that one."""
-    _, outlines = _board(target)
+    outlines = target.outlines
     markers = board.places(outlines)
     expected = inside(image, markers.reshape(-1, 2)).reshape(-1, 4).all(axis=1)
     read = expected & _bits(target).readable(board)

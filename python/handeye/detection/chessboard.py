@@ -1,49 +1,105 @@
 """Corners of a chessboard.
 
-Found by Duda and Frese, "Accurate detection and localization of checkerboard corners for calibration" (BMVC
-2018), as in `cv2.findChessboardCornersSB`, then measured by fitting a picture of a corner, see `corner_fit`.
+Crossings of edges are found in a small picture and joined to a mesh, see `saddles` and `mesh`, then measured
+in the image by fitting a picture of a corner, see `corner_fit`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
-from cv2.typing import MatLike
+from numpy.typing import NDArray
 
-from handeye.detection.base import (
-    Detection,
-    Image,
-    NotFound,
-    Reason,
-    is_mirrored,
-    ordered,
-)
+from handeye.detection.base import Detection, Image, NotFound, Reason, inside, ordered
 from handeye.detection.beyond import goes_on
-from handeye.detection.corner_fit import CornerKind, astray, fit_corners
+from handeye.detection.corner_fit import CornerFits, CornerKind, astray, corner_fits
 from handeye.detection.diagnosis import diagnose
+from handeye.detection.markers import from_neighbours
+from handeye.detection.mesh import FEWEST, Mesh, beside, filled, meshes, steps
 from handeye.detection.part import Part
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
+from handeye.detection.saddles import find_saddles
 from handeye.types import Chessboard
 from handeye.types.arrays import FloatArray
 
-# Searching takes time with the number of pixels; a board that fills the image is found at this size too.
-SEARCH_SIDE_PX = 2000
+# The search begins in a picture of about this size and goes on in ones twice as large, up to the image.
+COARSEST_SIDE_PX, SMALLEST_SIDE_PX = 500, 24
+# A third of a board's corners, or so many, must be joined before it is grown; of a board of any size so many.
+LARGE_CORE, FEWEST_CORE = 12, 6
 # Part of a square's height that the window of a corner may take.
 WINDOW_SHARE = 0.8
+# Fewer lines of corners may be any pattern.
+FEWEST_LINES = 3
+# Corners may be hidden or spoilt, but so many must be there, and so many of each outermost line: else the
+# board might lie one line off.
+LEAST_SHARE = 0.8
+LEAST_LINE_SHARE = 0.6
+# Of the corners so many must be measured well.
+LEAST_MEASURED = 0.4
+# A corner may be off from where those around it put it by this much, or this share of a square.
+OFF_PX, OFF_SHARE = 0.6, 0.02
 
 
 def find(image: Image, target: Chessboard) -> Detection | NotFound:
-    """Find all inner corners of a chessboard.
+    """Find the inner corners of a chessboard; a few that are hidden or spoilt are left out.
 
     Point 0 is chosen so that the square between the first corners of the first two rows is dark, if the board
-    can be turned so: the board stands as it is usually drawn, with a dark square at the upper left. (OpenCV's
-    `findChessboardCornersSB` begins at the light one.)
+    can be turned so: the board stands as it is usually drawn, with a dark square at the upper left.
     """
-    coarse = _search(image, target)
-    if coarse is None:
-        return _explain(image, target)
-    corners, _ = _measured(image, target, _labeled(image, target, coarse))
-    return ordered(target, np.arange(target.point_count), corners)
+    spoilt: NotFound | None = None
+    core = max(FEWEST, min(target.point_count // 3, LARGE_CORE))
+    for part in _parts(image):
+        for mesh in meshes(part.picture, find_saddles(part.picture), core):
+            laid = _laid(target, mesh)
+            if laid is None:
+                continue
+            found = _measured(image, target, _labeled(image, target, part.places(laid)))
+            if isinstance(found, Detection):
+                return found
+            spoilt = spoilt or found
+    return spoilt or diagnose(
+        image,
+        NotFound(Reason.NO_PATTERN, f"no chessboard with {target.columns} x {target.rows} inner corners"),
+    )
+
+
+def _parts(image: Image) -> Iterator[Part]:
+    """Return the image at sizes from coarse to its own."""
+    halvings = max(0, round(np.log2(max(image.shape) / COARSEST_SIDE_PX)))
+    for power in range(halvings, -1, -1):
+        part = Part.whole(image, 0.5**power)
+        if min(part.picture.shape) >= SMALLEST_SIDE_PX:
+            yield part
+
+
+def _laid(target: Chessboard, mesh: Mesh) -> FloatArray | None:
+    """Return corners (P, 2), NaN where there are none, if a mesh has the size of the board."""
+    grid = mesh.places
+    if grid.shape[:2] != (target.rows, target.columns):
+        grid = np.rot90(grid)
+    if grid.shape[:2] != (target.rows, target.columns) or not _is_certain(np.isfinite(grid[..., 0])):
+        return None
+    return grid.reshape(-1, 2)
+
+
+def _is_certain(there: NDArray[np.bool_]) -> bool:
+    """Tell whether so many of the corners (R, C) are there that the board cannot lie one line further."""
+    lines = (there[0], there[-1], there[:, 0], there[:, -1])
+    return bool(there.mean() >= LEAST_SHARE and all(line.mean() >= LEAST_LINE_SHARE for line in lines))
+
+
+def sizes(image: Image) -> Iterator[tuple[int, int]]:
+    """Yield rows and columns of corners of the chessboards that an image shows whole."""
+    for part in _parts(image):
+        for mesh in meshes(part.picture, find_saddles(part.picture), FEWEST_CORE):
+            rows, columns = mesh.there.shape
+            if min(rows, columns) >= FEWEST_LINES and _is_certain(mesh.there) and _is_whole(part, mesh):
+                yield rows, columns
+
+
+def _is_whole(part: Part, mesh: Mesh) -> bool:
+    """Tell whether the next line of corners on each side would be in the picture, too."""
+    return bool(inside(part.picture, beside(mesh)).all())
 
 
 def confirm(image: Image, target: Chessboard, board: Aligned) -> Detection | None:
@@ -52,49 +108,47 @@ def confirm(image: Image, target: Chessboard, board: Aligned) -> Detection | Non
     if board.likeness(plane).min() < LEAST_LIKENESS or goes_on(target, board):
         return None
     places = board.places(plane)
-    corners, complete = _measured(image, target, places)
-    if not complete or astray(corners, places, _edges(target, places).heights).any():
+    corners = _fitted(image, target, places).places
+    if astray(corners, places, _edges(target, places).heights).any():
         return None
     return ordered(target, np.arange(target.point_count), corners)
 
 
-def _measured(image: Image, target: Chessboard, corners: FloatArray) -> tuple[FloatArray, bool]:
-    """Return corners (P, 2) from first guesses, and whether all of them could be fitted."""
-    complete = True
+def _measured(image: Image, target: Chessboard, corners: FloatArray) -> Detection | NotFound:
+    """Return the corners from first guesses (P, 2), without those that are none or cannot be measured."""
+    fits = _fitted(image, target, corners)
+    fitted = fits.places
+    good = np.flatnonzero(~fits.spoilt())
+    if len(good) >= FEWEST:
+        plane = target.points[good, :2]
+        off = np.linalg.norm(from_neighbours(plane, fitted[good]) - fitted[good], axis=1)
+        pitch = np.linalg.norm(steps(fitted.reshape(target.rows, target.columns, 2)), axis=-1).min(axis=-1)
+        good = good[off <= np.maximum(OFF_PX, OFF_SHARE * pitch.ravel()[good])]
+    if len(good) < max(FEWEST, LEAST_MEASURED * target.point_count):
+        return NotFound(
+            Reason.INCOMPLETE, f"only {len(good)} of {target.point_count} corners can be measured"
+        )
+    return ordered(target, good, fitted[good])
+
+
+def _fitted(image: Image, target: Chessboard, corners: FloatArray) -> CornerFits:
+    """Return the corners (P) as fitted from first guesses (P, 2)."""
+    fits: CornerFits | None = None
     # Twice: what the corners found tell about their edges is better than what those of the search told.
-    for _ in range(2):
-        edges = _edges(target, corners)
-        fitted = fit_corners(
+    for rough in (True, False):
+        guesses = filled(corners.reshape(target.rows, target.columns, 2)).reshape(-1, 2)
+        edges = _edges(target, guesses)
+        fits = corner_fits(
             image,
-            corners,
+            guesses,
             edges.directions,
             WINDOW_SHARE * edges.heights,
             CornerKind.CROSSING,
             edges.curvatures,
+            rough=rough,
         )
-        good = np.isfinite(fitted)
-        complete = complete and bool(good.all())
-        # Where glare or a shadow's edge spoils the picture, what the search found is still the corner.
-        corners = np.where(good, fitted, corners)
-    return corners, complete
-
-
-def _search(image: Image, target: Chessboard) -> FloatArray | None:
-    """Return corners (P, 2) in the order OpenCV gives them, cheap attempts first."""
-    longest = max(image.shape)
-    if longest > SEARCH_SIDE_PX:
-        found = _within(Part.whole(image, SEARCH_SIDE_PX / longest), target)
-        if found is not None:
-            return found
-    found = _corners(image, target, 0)
-    if found is None:
-        found = _corners(image, target, cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE)
-    return found
-
-
-def _within(part: Part, target: Chessboard) -> FloatArray | None:
-    found = _corners(part.picture, target, 0)
-    return None if found is None else part.places(found)
+        corners = fits.places
+    return fits
 
 
 @dataclass(frozen=True)
@@ -138,20 +192,6 @@ def _along(grid: FloatArray) -> list[FloatArray]:
     return [direction, smooth, shortest]
 
 
-def _corners(image: MatLike, target: Chessboard, flags: int) -> FloatArray | None:
-    if min(image.shape) < 8:
-        return None
-    found, corners = cv2.findChessboardCornersSB(image, (target.columns, target.rows), flags=flags)
-    if not found or len(corners) != target.point_count:
-        return None
-    corners = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
-    if not np.isfinite(corners).all():
-        return None
-    if is_mirrored(target.points[:, :2], corners):
-        corners = corners.reshape(target.rows, target.columns, 2)[:, ::-1].reshape(-1, 2)
-    return corners
-
-
 def _labeled(image: Image, target: Chessboard, corners: FloatArray) -> FloatArray:
     """Return the corners turned so that the first square is dark, if a turn does that."""
     for turn in target.turns:
@@ -163,7 +203,7 @@ def _labeled(image: Image, target: Chessboard, corners: FloatArray) -> FloatArra
 
 
 def _first_square_is_dark(image: Image, target: Chessboard, corners: FloatArray) -> bool:
-    grid = corners.reshape(target.rows, target.columns, 2)
+    grid = filled(corners.reshape(target.rows, target.columns, 2))
     middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[1:, :-1] + grid[:-1, 1:]) / 4
     columns, rows = np.rint(middles).astype(int).transpose(2, 0, 1)
     height, width = image.shape
@@ -172,19 +212,3 @@ def _first_square_is_dark(image: Image, target: Chessboard, corners: FloatArray)
     # One square alone (2 x 2 corners) has no neighbour; the image as a whole stands in.
     others = grey[~even].mean() if (~even).any() else float(image.mean())
     return bool(grey[even].mean() < others)
-
-
-def _explain(image: Image, target: Chessboard) -> NotFound:
-    """Look for a board of another size."""
-    wanted = f"{target.columns} x {target.rows}"
-    found, _, meta = cv2.findChessboardCornersSBWithMeta(
-        image, (3, 3), cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
-    )
-    if found:
-        rows, columns = meta.shape[:2]
-        if {rows, columns} != {target.rows, target.columns}:
-            return NotFound(
-                Reason.WRONG_SIZE,
-                f"a chessboard with {columns} x {rows} inner corners is visible, expected {wanted}",
-            )
-    return diagnose(image, NotFound(Reason.NO_PATTERN, f"no chessboard with {wanted} inner corners"))

@@ -6,6 +6,7 @@ the edges: several times closer to the truth on rendered boards than `cv2.findCh
 fitting itself is done in `handeye._core`.
 """
 
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -26,6 +27,10 @@ FEWEST_TOLD, FEW = 6, 16
 WIDE_PX = 5.0
 # Directions are taken over this share of a board.
 TOLD_SHARE = 0.02
+
+# Residuals of a corner are larger than those of most by this factor, and than this share of its contrast,
+# where there is something else.
+MISFIT_RATIO, MISFIT_SHARE = 1.5, 0.03
 
 
 class CornerKind(Enum):
@@ -74,7 +79,37 @@ def nearer(
     return np.where(good[:, np.newaxis], found, expected), directions
 
 
-def fit_corners(
+@dataclass(frozen=True, eq=False)
+class CornerFits:
+    """Corners that were fitted, NaN where that failed.
+
+    Attributes
+    ----------
+    places
+        (N, 2) pixels.
+    spreads
+        (N, 2, 2) covariances of the places in px^2, for independent residuals of one grey value.
+    misfits
+        (N,) root mean squares of the residuals, in grey values of the smoothed picture.
+    contrasts
+        (N,) grey steps across the edges.
+    """
+
+    places: FloatArray
+    spreads: FloatArray
+    misfits: FloatArray
+    contrasts: FloatArray
+
+    def spoilt(self) -> NDArray[np.bool_]:
+        """Tell which corners (N,) were not fitted, or not as well as the others: a shadow's edge or glare."""
+        there = np.isfinite(self.misfits)
+        if not there.any():
+            return ~there
+        usual = float(np.median(self.misfits[there]))
+        return ~(self.misfits <= np.maximum(MISFIT_RATIO * usual, MISFIT_SHARE * self.contrasts))
+
+
+def corner_fits(
     image: Image,
     corners: FloatArray,
     directions: FloatArray,
@@ -83,8 +118,8 @@ def fit_corners(
     curvatures: FloatArray | None = None,
     bands: FloatArray | None = None,
     rough: bool = False,
-) -> FloatArray:
-    """Return corners (N, 2), NaN where the fit fails.
+) -> CornerFits:
+    """Return corners as fitted from first guesses.
 
     Parameters
     ----------
@@ -104,7 +139,7 @@ def fit_corners(
     rough
         Whether to end near the places, as is enough to begin once more from there.
     """
-    return _core.fit_corners(
+    found = _core.fit_corners(
         image,
         corners,
         directions,
@@ -114,3 +149,18 @@ def fit_corners(
         kind is CornerKind.CROSSING,
         rough,
     )
+    return CornerFits(*found)
+
+
+def fit_corners(
+    image: Image,
+    corners: FloatArray,
+    directions: FloatArray,
+    radii: FloatArray,
+    kind: CornerKind,
+    curvatures: FloatArray | None = None,
+    bands: FloatArray | None = None,
+    rough: bool = False,
+) -> FloatArray:
+    """Return the places (N, 2) of `corner_fits`, NaN where the fit fails."""
+    return corner_fits(image, corners, directions, radii, kind, curvatures, bands, rough).places

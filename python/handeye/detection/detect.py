@@ -1,34 +1,41 @@
 """Find a target of any family in an image."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 
-from handeye.detection import april_grid, charuco, chessboard, circle_grid
-from handeye.detection.base import Detection, Image, NotFound, Reason
+from handeye.detection import charuco, chessboard, circle_grid, tags
+from handeye.detection.base import Detection, Image, NotFound, Reason, upright
+from handeye.detection.description import explained
 from handeye.detection.predicted import Prediction, where_expected
 from handeye.detection.registration import Aligned
 from handeye.errors import InputError
-from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid, Target
+from handeye.types import Charuco, Chessboard, CircleGrid, Target
+from handeye.types.target import MarkerCorners
 
 SMALLEST_SIDE_PX = 24
 # To be raised with every change of what is detected, or where.
-VERSION = 4
+VERSION = 5
 
-_FINDERS: dict[type[Target], Callable[[Image, Any], Detection | NotFound]] = {
-    Chessboard: chessboard.find,
-    CircleGrid: circle_grid.find,
-    Charuco: charuco.find,
-    AprilGrid: april_grid.find,
-}
-_CONFIRMERS: dict[type[Target], Callable[[Image, Any, Aligned], Detection | None]] = {
-    Chessboard: chessboard.confirm,
-    CircleGrid: circle_grid.confirm,
-    Charuco: charuco.confirm,
-    AprilGrid: april_grid.confirm,
-}
+
+@dataclass(frozen=True)
+class Kind:
+    """How one kind of points is found: anywhere, and where it is expected."""
+
+    targets: type[Target]
+    find: Callable[[Image, Any], Detection | NotFound]
+    confirm: Callable[[Image, Any, Aligned], Detection | None]
+
+
+KINDS = (
+    Kind(Chessboard, chessboard.find, chessboard.confirm),
+    Kind(CircleGrid, circle_grid.find, circle_grid.confirm),
+    Kind(Charuco, charuco.find, charuco.confirm),
+    Kind(MarkerCorners, tags.find, tags.confirm),
+)
 
 
 def detect(image: Image, target: Target, *, predicted: Prediction | None = None) -> Detection | NotFound:
@@ -58,8 +65,8 @@ def detect(image: Image, target: Target, *, predicted: Prediction | None = None)
         Not a grey image of bytes, a family of targets for which there is no detector, or a prediction for
         another number of points.
     """
-    finder = _FINDERS.get(type(target))
-    if finder is None:
+    kind = next((kind for kind in KINDS if isinstance(target, kind.targets)), None)
+    if kind is None:
         raise InputError(f"target: no detector for the family {target.family}", code="unknown_target")
     if image.ndim != 2 or image.dtype != np.uint8:
         raise InputError(
@@ -70,22 +77,23 @@ def detect(image: Image, target: Target, *, predicted: Prediction | None = None)
     if min(image.shape) < SMALLEST_SIDE_PX:
         height, width = image.shape
         return NotFound(Reason.IMAGE_TOO_SMALL, f"the image has only {width} x {height} pixels")
-    whole = np.ascontiguousarray(image)
+    whole, positive = upright(np.ascontiguousarray(image), target)
     if predicted is not None:
-        found = _where_predicted(whole, target, predicted)
+        found = _where_predicted(whole, positive, kind, predicted)
         if found is not None:
             return found
     try:
-        return finder(whole, target)
+        found = kind.find(whole, positive)
+        return explained(image, target, found) if isinstance(found, NotFound) else found
     except cv2.error as error:
         # OpenCV asserts on some contents; to the caller that is one image without a target, not a crash.
         return NotFound(Reason.DETECTOR_FAILED, f"OpenCV: {str(error).strip()[:200]}")
 
 
-def _where_predicted(image: Image, target: Target, predicted: Prediction) -> Detection | None:
+def _where_predicted(image: Image, target: Target, kind: Kind, predicted: Prediction) -> Detection | None:
     """Return what is found where it is expected, None if the whole image is to be looked at."""
     try:
         board = where_expected(image, target, predicted)
-        return None if board is None else _CONFIRMERS[type(target)](image, target, board)
+        return None if board is None else kind.confirm(image, target, board)
     except cv2.error:
         return None

@@ -10,14 +10,17 @@ from numpy.typing import NDArray
 from handeye.detection.base import Image, NotFound, Reason
 from handeye.detection.beyond import correlation
 from handeye.detection.registration import Aligned, drawn
-from handeye.types import Target
 from handeye.types.arrays import FloatArray, IndexArray
+from handeye.types.target import Coded
+from handeye.types.target.dictionaries import marker_bits
 
 # Smallest perimeter of a marker, as a share of the longer side of the image.
 SMALLEST_PERIMETER_SHARE = 0.015
 # How far a marker may lie from where its neighbour expects it, as a share of their distance.
 TOLERANCE = 0.3
 CONSISTENT_SHARE = 0.75
+# Neighbours of a marker are so much further than the nearest.
+AROUND = 1.5
 NEIGHBOURS = 12
 # Corners are weighed so many times; those closer than this to where they should be all count the same.
 WEIGHINGS = 5
@@ -28,11 +31,8 @@ LEAST_AGREEMENT = 0.75
 LEAST_CONTRAST = 5.0
 # Of the markers that should be in the image so many must be readable.
 LEAST_SHARE = 0.5
-# One of each kind; smaller dictionaries are beginnings of these.
-_LARGEST = (
-    "DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL",
-    "DICT_APRILTAG_16h5", "DICT_APRILTAG_25h9", "DICT_APRILTAG_36h10", "DICT_APRILTAG_36h11",
-)  # fmt: skip
+
+NO_IDS: IndexArray = np.zeros(0, dtype=np.int64)
 
 
 def parameters(border_bits: int) -> cv2.aruco.DetectorParameters:
@@ -50,20 +50,57 @@ def dictionary(name: str) -> cv2.aruco.Dictionary:
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
 
 
-def find_markers(image: Image, name: str, border_bits: int) -> tuple[IndexArray, FloatArray]:
-    """Return ids (M,) and corners (M, 4, 2) of markers, in OpenCV's order; no id twice."""
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Markers of one dictionary in an image.
+
+    Attributes
+    ----------
+    ids
+        (M,) their numbers, no number twice.
+    corners
+        (M, 4, 2) their corners in OpenCV's order.
+    repeated
+        Numbers that are in the image more than once.
+    """
+
+    ids: IndexArray
+    corners: FloatArray
+    repeated: IndexArray
+
+    @classmethod
+    def of(cls, ids: object, corners: object) -> "Seen":
+        """Return what OpenCV gives as arrays."""
+        numbers = np.zeros(0, dtype=np.int64) if ids is None else np.asarray(ids, dtype=np.int64).ravel()
+        places = np.asarray(corners, dtype=np.float64).reshape(-1, 4, 2)[: len(numbers)]
+        values, counts = np.unique(numbers, return_counts=True)
+        once = np.isin(numbers, values[counts == 1])
+        return cls(numbers[once], places[once], values[counts > 1])
+
+    def of_board(self, target: Coded) -> "tuple[IndexArray, FloatArray] | NotFound":
+        """Return which markers (K,) of a board are there, and their corners (K, 4, 2) in the image.
+
+        Other markers in the picture are no matter: they are of another board.
+        """
+        of_board = target.marker_ids
+        once = np.setdiff1d(self.ids, self.repeated)
+        if (again := int(np.isin(self.repeated, of_board).sum())) > np.isin(once, of_board).sum():
+            return NotFound(
+                Reason.REPEATED,
+                f"the board is in the picture twice: {again} of its markers are seen twice",
+            )
+        order = np.argsort(of_board)
+        at = np.searchsorted(of_board, self.ids, sorter=order).clip(0, len(order) - 1)
+        which = order[at]
+        known = of_board[which] == self.ids
+        return which[known], self.corners[known]
+
+
+def find_markers(image: Image, name: str, border_bits: int) -> Seen:
+    """Return the markers of a dictionary."""
     detector = cv2.aruco.ArucoDetector(dictionary(name), parameters(border_bits))
     corners, ids, _ = detector.detectMarkers(image)
-    return unique(ids, corners)
-
-
-def unique(ids: object, corners: object) -> tuple[IndexArray, FloatArray]:
-    """Return OpenCV's markers as arrays (M,) and (M, 4, 2), without ids seen twice."""
-    numbers = np.zeros(0, dtype=np.int64) if ids is None else np.asarray(ids, dtype=np.int64).ravel()
-    places = np.asarray(corners, dtype=np.float64).reshape(-1, 4, 2)[: len(numbers)]
-    values, counts = np.unique(numbers, return_counts=True)
-    once = np.isin(numbers, values[counts == 1])
-    return numbers[once], places[once]
+    return Seen.of(ids, corners)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,10 +119,10 @@ class Bits:
     drawn: FloatArray
 
     @classmethod
-    def of(cls, target: Target, outlines: FloatArray, name: str, border_bits: int) -> "Bits":
-        """Return the bits of markers of a dictionary, with corners (M, 4, 2) in the plane, all round."""
-        bits = dictionary(name).markerSize
-        steps = (border_bits + np.arange(bits) + 0.5) / (bits + 2 * border_bits)
+    def of(cls, target: Coded) -> "Bits":
+        """Return the bits of the markers of a board."""
+        bits, outlines = marker_bits(target.dictionary), target.outlines
+        steps = (target.border_bits + np.arange(bits) + 0.5) / (bits + 2 * target.border_bits)
         first = outlines[:, np.newaxis, np.newaxis, 0]
         across, down = (outlines[:, np.newaxis, np.newaxis, k] - first for k in (1, 3))
         places = first + across * steps[:, np.newaxis] + down * steps[:, np.newaxis, np.newaxis]
@@ -101,7 +138,8 @@ class Bits:
 def disagreement(plane: FloatArray, pixels: FloatArray) -> NotFound | None:
     """Return why markers cannot be those of the board, None if they agree with it.
 
-    Each marker says by its own corners where its neighbour must be; so neither perspective nor lens matters.
+    Each pair of neighbours says by their own corners how far apart they must be; so neither perspective nor
+    lens matters.
 
     Parameters
     ----------
@@ -113,30 +151,22 @@ def disagreement(plane: FloatArray, pixels: FloatArray) -> NotFound | None:
     centres, seen = plane.mean(axis=1), pixels.mean(axis=1)
     away = np.linalg.norm(centres[:, np.newaxis] - centres, axis=2)
     np.fill_diagonal(away, np.inf)
-    nearest = np.argmin(away, axis=1)
-    # The affine map of each marker's own corners, least squares.
+    nearest = away.min(axis=1, keepdims=True)
+    # All around, so that rows of another length show: there only neighbours in a row agree.
+    i, j = np.nonzero(away <= AROUND * nearest)
+    # The affine map of each marker's own corners, least squares; between two the mean of both.
     inverse = np.asarray(np.linalg.pinv(plane - centres[:, np.newaxis]), dtype=np.float64)
     A = inverse @ (pixels - seen[:, np.newaxis])
-    step = (centres[nearest] - centres)[:, np.newaxis] @ A
-    miss = np.linalg.norm(step[:, 0] + seen - seen[nearest], axis=1)
-    agree = int((miss < TOLERANCE * np.linalg.norm(seen[nearest] - seen, axis=1)).sum())
-    if agree >= CONSISTENT_SHARE * len(plane):
+    step = ((centres[j] - centres[i])[:, np.newaxis] @ (A[i] + A[j]) / 2)[:, 0]
+    miss = np.linalg.norm(seen[i] + step - seen[j], axis=1)
+    good = miss < TOLERANCE * np.linalg.norm(seen[j] - seen[i], axis=1)
+    agree = np.bincount(i, good, len(plane)) >= CONSISTENT_SHARE * np.bincount(i, minlength=len(plane))
+    if agree.sum() >= CONSISTENT_SHARE * len(plane):
         return None
     return NotFound(
-        Reason.INCONSISTENT, f"only {agree} of {len(plane)} markers lie as they would on the board described"
+        Reason.INCONSISTENT,
+        f"only {agree.sum()} of {len(plane)} markers lie as they would on the board described",
     )
-
-
-def foreign_markers(image: Image, expected: str, border_bits: int) -> NotFound | None:
-    """Return word of markers of another dictionary, None if there are none."""
-    kind = expected.rsplit("_", 1)[0]
-    for name in _LARGEST:
-        if name != expected and not ("X" in kind and name.startswith(kind)):
-            ids, _ = find_markers(image, name, border_bits)
-            if len(ids) >= 4:
-                evidence = f"{len(ids)} markers of the kind {name} are visible, expected {expected}"
-                return NotFound(Reason.INCONSISTENT, evidence)
-    return None
 
 
 def from_neighbours(plane: FloatArray, pixels: FloatArray) -> FloatArray:
@@ -154,7 +184,7 @@ def from_neighbours(plane: FloatArray, pixels: FloatArray) -> FloatArray:
         return pixels.copy()
     away = np.linalg.norm(plane[:, np.newaxis] - plane, axis=2)
     np.fill_diagonal(away, np.inf)
-    around = np.argsort(away, axis=1)[:, :NEIGHBOURS]
+    around = np.argpartition(away, min(NEIGHBOURS, len(plane) - 1), axis=1)[:, :NEIGHBOURS]
     # Coordinates about each corner, of size one; then the corner itself is at the origin of the plane.
     x, _ = _about(plane[around], plane)
     u, extent = _about(pixels[around], pixels)

@@ -15,12 +15,15 @@ import numpy as np
 
 from handeye import _core
 from handeye.detection.base import Image
-from handeye.pattern import pattern_of
-from handeye.types import AprilGrid, Charuco, Chessboard, CircleGrid, Target
+from handeye.pattern import Pattern
+from handeye.types import Target
 from handeye.types.arrays import FloatArray
+from handeye.types.target.artwork import Artwork, Markers, Squares
 
 # Pixels of the squared picture for a square's side, a circle's radius and a marker's bit.
 SQUARE_PX, RADIUS_PX, BIT_PX = 8.0, 3.0, 1.3
+# Side of the squared picture of a board with markers.
+LEAST_MARKER_PX = 60.0
 LARGEST_PICTURE_PX = 40_000
 # Light margin around what is printed, in pitches.
 MARGIN = 0.35
@@ -34,20 +37,14 @@ LEAST_LIKENESS = 0.6
 
 @lru_cache(maxsize=16)
 def printed(target: Target) -> _core.Printed:
-    """Return the picture of a target.
-
-    Raises
-    ------
-    InputError
-        A family of targets that nobody has drawn.
-    """
-    pattern = pattern_of(target)
-    pitch, scale = _measures(target)
+    """Return the picture of a target."""
+    pattern, artwork = Pattern(target), target.artwork()
+    pitch = target.spacing_m
     extent = pattern.high - pattern.low + 2 * MARGIN * pitch
-    scale = min(scale, float(np.sqrt(LARGEST_PICTURE_PX / np.prod(extent))))
+    scale = min(_detail(target, artwork, pattern), float(np.sqrt(LARGEST_PICTURE_PX / np.prod(extent))))
     # Squares and margin of whole pixels, so that samples have lines where they are; where the lines between
     # pixels are others for each tag, that averages out.
-    if isinstance(target, Chessboard | Charuco):
+    if any(isinstance(layer, Squares) and layer.side_m == layer.pitch_m for layer in artwork.layers):
         scale = max(np.rint(pitch * scale), 1.0) / pitch
     margin = np.ceil(MARGIN * pitch * scale) / scale
     low, high = pattern.low - margin, pattern.high + margin
@@ -60,19 +57,12 @@ def printed(target: Target) -> _core.Printed:
     return _core.Printed(blurred, (low[0], low[1]), scale, pitch, light_px)
 
 
-def _measures(target: Target) -> tuple[float, float]:
-    """Return the pitch in metres, and the pixels per metre that the details need."""
-    if isinstance(target, Chessboard):
-        return target.pitch_m, SQUARE_PX / target.pitch_m
-    if isinstance(target, CircleGrid):
-        return target.pitch_m, RADIUS_PX / target.radius_m
-    if isinstance(target, Charuco):
-        return target.square_m, BIT_PX / pattern_of(target).finest_m
-    if isinstance(target, AprilGrid):
-        pitch = target.tag_m * (1 + target.spacing_ratio)
-        return pitch, BIT_PX / min(pattern_of(target).finest_m, target.tag_m / 8)
-    size = float(np.ptp(target.points[:, :2], axis=0).max())
-    return size, np.sqrt(LARGEST_PICTURE_PX) / size
+def _detail(target: Target, artwork: Artwork, pattern: Pattern) -> float:
+    """Return the pixels per metre that the details of a picture need."""
+    if any(isinstance(layer, Markers) for layer in artwork.layers):
+        # A single marker has few bits to be laid over an image by.
+        return max(BIT_PX / pattern.finest_m, LEAST_MARKER_PX / float((pattern.high - pattern.low).max()))
+    return RADIUS_PX / target.radius_m if target.radius_m > 0 else SQUARE_PX / target.spacing_m
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,5 +102,5 @@ def aligned(
     a marker may be another one, and what is hidden is not known.
     """
     # Circles may be light on a dark board.
-    found = printed(target).align(image, plane, pixels, margin_px, isinstance(target, CircleGrid))
+    found = printed(target).align(image, plane, pixels, margin_px, target.radius_m > 0)
     return None if found is None else Aligned(found)

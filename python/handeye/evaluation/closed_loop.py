@@ -12,10 +12,11 @@ import numpy as np
 from handeye.errors import InputError, SolveError
 from handeye.evaluation.comparison import POLICIES, summary
 from handeye.evaluation.parallel import Progress, run_all
-from handeye.session.configuration import Configuration, Simulation, begin, prepare
+from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import START_VIEWS
 from handeye.session.entry import Entry
 from handeye.session.request import Reach, reach
+from handeye.session.settings import Configuration, Simulation
 from handeye.solving import Estimate
 from handeye.types import Pose
 from handeye.types.arrays import FloatArray

@@ -11,7 +11,8 @@ from handeye.evaluation import metrics
 from handeye.evaluation.parallel import Progress, Workers, run_all
 from handeye.evaluation.protocol import Protocol, Trial, draw_trials
 from handeye.planning import NumberOfViews, Planner, PlannerOptions, Pool, Proposal, make_policy
-from handeye.solving import Estimate, Estimator, Measurements, Sight, make_estimator
+from handeye.planning.prediction import Sight
+from handeye.solving import Estimate, Estimator, Measurements, make_estimator
 from handeye.types import Pose, Recording
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName

@@ -35,8 +35,13 @@ def deviation(difference: Pose) -> Deviation:
 
 
 def absolute_error(X: Pose, X_true: Pose) -> Deviation:
-    """Return the error of a hand-eye against its truth, ``inv(X) X_true`` (paper, section V-A)."""
-    return deviation(X.inverse() @ X_true)
+    """Return how far the centre of the camera is off, and by what angle the camera is turned.
+
+    ``X_true inv(X)``, the pose of the camera in the true camera: its translation is the error of the centre
+    whatever the frame that the camera is fixed in. (The paper's ``inv(X) X_true``, section V-A, is the error
+    of where the camera sees the flange or base, which grows with the distance to it.)
+    """
+    return deviation(X_true @ X.inverse())
 
 
 def held_out_rmse_px(estimate: Estimate, held_out: Measurements) -> float:
@@ -73,8 +78,8 @@ def relative_error(estimate: Estimate, held_out: Measurements) -> Deviation:
     InputError
         No view.
     """
-    poses = inverses(_some(held_out).camera_poses)
-    motions = estimate.corrected(held_out).motions
+    held_out = _as_estimated(estimate, held_out)
+    poses, motions = inverses(held_out.camera_poses), held_out.motions
     return _mean_deviation(estimate.Y.matrix @ poses @ estimate.X.matrix @ motions)
 
 
@@ -86,14 +91,21 @@ def relative_error_at_target(estimate: Estimate, held_out: Measurements) -> Devi
     InputError
         No view.
     """
-    poses = inverses(_some(held_out).camera_poses)
-    motions = estimate.corrected(held_out).motions
+    held_out = _as_estimated(estimate, held_out)
+    poses, motions = inverses(held_out.camera_poses), held_out.motions
     return _mean_deviation(poses @ estimate.X.matrix @ motions @ estimate.Y.matrix)
 
 
 def inverses(poses: FloatArray) -> FloatArray:
     """(..., 4, 4) inverses of rigid transforms (..., 4, 4)."""
     return np.asarray(np.linalg.inv(poses), dtype=np.float64)
+
+
+def _as_estimated(estimate: Estimate, held_out: Measurements) -> Measurements:
+    """Return views as the estimate has camera and arm: X belongs to the camera that it was found with."""
+    some = _some(held_out)
+    same = estimate.camera == some.camera
+    return estimate.corrected(some if same else some.through(estimate.camera))
 
 
 def _some(held_out: Measurements) -> Measurements:

@@ -19,6 +19,7 @@ from handeye.robots import Arm, open_arm
 from handeye.robots.displaced import displaced, random_displacements
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Target, Truth, View
 from handeye.types.arrays import FloatArray
+from handeye.types.pose import through_twist
 
 
 class ErrorKind(StrEnum):
@@ -260,11 +261,7 @@ def camera_information(camera: Camera, target: Target, T_camera_target: FloatArr
     """(n, n) information about the camera's parameters in a view of unknown pose, at a noise of 1 px."""
     points = _in_camera(T_camera_target, target)
     _, in_point, in_parameters, _ = _core.project_jacobians(camera.lens, camera.parameters, points)
-    # d(point)/d(left twist) = [I, -[point]x]
-    cross = np.zeros((len(points), 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = points[:, 2], -points[:, 1], points[:, 0]
-    cross -= np.swapaxes(cross, 1, 2)
-    in_pose = np.concatenate([in_point, in_point @ cross], axis=2).reshape(-1, 6)
+    in_pose = through_twist(points, in_point).reshape(-1, 6)
     in_camera = in_parameters.reshape(len(in_pose), -1)
     mixed = in_pose.T @ in_camera
     return in_camera.T @ in_camera - mixed.T @ np.linalg.solve(in_pose.T @ in_pose, mixed)

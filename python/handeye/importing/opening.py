@@ -199,7 +199,11 @@ def _of_images(images: ImageSet, given: Camera | None, progress: Callable[[int, 
     ]
     recording = images.recording(camera, views)
     # What both the set and the recording made of it look at is said once.
-    warnings = {warning.code: warning for warning in (*images.warnings, *recording_warnings(recording))}
+    notes = dict.fromkeys(detection.note for detection in found.values() if detection.note)
+    differs = [DataWarning("target_differs", note) for note in notes]
+    warnings = {
+        warning.code: warning for warning in (*images.warnings, *differs, *recording_warnings(recording))
+    }
     return Opened(recording, images.folder, images.layout, origin, missed, tuple(warnings.values()))
 
 
@@ -216,12 +220,11 @@ def _detect(
         The target is in no image, or the first ones show one of another size.
     """
     total, done, wrong = len(images.shots), 0, 0
-    size = images.image_size_px or (0, 0)
+    sizes: dict[str, tuple[int, int]] = {}
 
     def read(shot: Shot) -> Image:
-        nonlocal size
         image = read_image(images.image_path(shot))
-        size = (image.shape[1], image.shape[0])
+        sizes[shot.name] = (image.shape[1], image.shape[0])
         return image
 
     def count(name: str, outcome: Detection | HandeyeError) -> None:
@@ -231,11 +234,11 @@ def _detect(
             raise InputError(f"{where}: {outcome.message}", code=outcome.code, hint=outcome.hint) from outcome
         done += 1
         progress(done, total)
-        if isinstance(outcome, DetectionError) and outcome.code == Reason.WRONG_SIZE:
+        if isinstance(outcome, DetectionError) and outcome.code in {Reason.WRONG_SIZE, Reason.OTHER_BOARD}:
             wrong += 1
             if wrong == done == ENOUGH_OF_WRONG_SIZE:
                 raise DetectionError(
-                    f"the first {done} of {total} images show a target of another size; {outcome.message}",
+                    f"the first {done} of {total} images show another target; {outcome.message}",
                     code="not_detected",
                     hint=outcome.hint,
                 ) from outcome
@@ -245,7 +248,7 @@ def _detect(
     batch = detect_all(readers, images.target, progress=count)
     batch.raise_if_none()
     missed = {name: error.message.removeprefix(f"{name}: ") for name, error in batch.failed.items()}
-    return batch.found, missed, size
+    return batch.found, missed, sizes.get(images.shots[-1].name) or images.image_size_px or (0, 0)
 
 
 def _camera(
@@ -255,7 +258,9 @@ def _camera(
         if camera is not None:
             _check_size(camera, size, f"the pictures in {images.folder}")
             return camera, origin
-    return calibrate_camera(images.target, found, size).camera, CameraOrigin.CALIBRATED
+    camera = calibrate_camera(images.target, found, size).camera
+    of_views = Camera(camera.lens, camera.parameters, *camera.size_px, camera.covariance, from_views=True)
+    return of_views, CameraOrigin.CALIBRATED
 
 
 def _check_size(camera: Camera, size: tuple[int, int], what: str) -> None:

@@ -31,6 +31,11 @@ class Rotation(Protocol):
         """How many decimals write them to 1e-5 degrees or better."""
         ...
 
+    @property
+    def words(self) -> str:
+        """What they are, for a person."""
+        ...
+
     def matrices(self, values: FloatArray) -> FloatArray:
         """Return the rotations (N, 3, 3) of rows (N, count); NaN where a row is none."""
         ...
@@ -69,6 +74,11 @@ class Euler:
         """How many decimals are enough."""
         return 5 if self.degrees else 7
 
+    @property
+    def words(self) -> str:
+        """What the rotation is, for a person."""
+        return "deg" if self.degrees else "rad"
+
     def matrices(self, values: FloatArray) -> FloatArray:
         """Return the rotations (N, 3, 3) of rows (N, 3)."""
         angles = np.deg2rad(values) if self.degrees else values
@@ -99,6 +109,11 @@ class RotationVector:
     def decimals(self) -> int:
         """How many decimals are enough."""
         return 5 if self.degrees else 7
+
+    @property
+    def words(self) -> str:
+        """What the rotation is, for a person."""
+        return f"a rotation vector in {'deg' if self.degrees else 'rad'}"
 
     def matrices(self, values: FloatArray) -> FloatArray:
         """Return the rotations (N, 3, 3) of rows (N, 3), by Rodrigues' formula."""
@@ -134,6 +149,11 @@ class Quaternion:
     def decimals(self) -> int:
         """How many decimals are enough."""
         return 9
+
+    @property
+    def words(self) -> str:
+        """What the rotation is, for a person."""
+        return "a quaternion"
 
     def matrices(self, values: FloatArray) -> FloatArray:
         """Return the rotations (N, 3, 3) of rows (N, 4); NaN where the norm is not 1 up to rounding."""
@@ -173,6 +193,11 @@ class Nine:
         """How many decimals are enough."""
         return 9
 
+    @property
+    def words(self) -> str:
+        """What the rotation is, for a person."""
+        return "a rotation matrix"
+
     def matrices(self, values: FloatArray) -> FloatArray:
         """Return the matrices (N, 3, 3) of rows (N, 9) as they are."""
         matrices = values.reshape(-1, 3, 3)
@@ -194,6 +219,11 @@ class Form(Protocol):
     @property
     def decimals(self) -> int:
         """Decimals of the numbers that are no lengths."""
+        ...
+
+    @property
+    def words(self) -> str:
+        """What stands beside the lengths, for a person."""
         ...
 
     def matrices(self, values: FloatArray) -> FloatArray:
@@ -230,6 +260,11 @@ class Vector:
         """Decimals of the rotation."""
         return self.rotation.decimals
 
+    @property
+    def words(self) -> str:
+        """What the rotation is, for a person."""
+        return self.rotation.words
+
     def matrices(self, values: FloatArray) -> FloatArray:
         """Return matrices (N, 4, 4)."""
         position, turn = (
@@ -258,6 +293,11 @@ class Matrix:
     def decimals(self) -> int:
         """Decimals of the rotation."""
         return 9
+
+    @property
+    def words(self) -> str:
+        """What the rotation is, for a person."""
+        return "a rotation matrix"
 
     def matrices(self, values: FloatArray) -> FloatArray:
         """Return matrices (N, 4, 4); NaN where the last row is not 0 0 0 1."""

@@ -4,6 +4,7 @@ from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.next_views import plan
 from handeye.planning.planner import Planner, PlannerOptions, Proposal, Verdict, replay
 from handeye.planning.policies import POLICIES, Policy, make_policy
+from handeye.planning.prediction import Prediction, Sight
 from handeye.planning.ranking import Prospect, Ranking, rank
 from handeye.planning.stopping import (
     Accuracy,
@@ -25,9 +26,11 @@ __all__ = [
     "PlannerOptions",
     "Policy",
     "Pool",
+    "Prediction",
     "Proposal",
     "Prospect",
     "Ranking",
+    "Sight",
     "Stop",
     "StopReason",
     "StopRule",

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from handeye import _core
 from handeye.errors import InputError
 from handeye.planning.candidates import Candidate, Pool
-from handeye.solving.estimate import Estimate, Sight, regular_information
+from handeye.planning.prediction import Prediction, Sight
+from handeye.solving.estimate import Estimate, regular_information
 from handeye.types.arrays import FloatArray
 
 OBJECTIVES = ("entropy", "entropy_handeye", "tool_point")
@@ -63,7 +64,7 @@ def plan_batch(
     tool_points_m: ArrayLike | None = None,
     sight: Sight | None = None,
 ) -> BatchPlan:
-    """Choose `count` views of a pool together, under the likeliest hypothesis about the robot's noise.
+    """Choose `count` views of a pool together, at the likeliest noise of the robot.
 
     Parameters
     ----------
@@ -91,10 +92,8 @@ def plan_batch(
         raise InputError(
             f"objective {objective!r}, expected one of {', '.join(OBJECTIVES)}", code="unknown_criterion"
         )
-    hypothesis = estimate.hypotheses[0]
-    predictor = estimate.predictor(hypothesis, sight or Sight())
-    jacobians = estimate.jacobians(pool.joints)
-    informations = predictor.informations(pool.motions(estimate.mounting), jacobians=jacobians)
+    prediction = Prediction(estimate, sight or Sight())
+    informations = prediction.informations(pool.motions(estimate.mounting), pool.joints)
     feasible = np.flatnonzero(np.trace(informations, axis1=1, axis2=2) > 0)
     if not 1 <= count <= len(feasible):
         raise InputError(
@@ -104,13 +103,13 @@ def plan_batch(
         )
     offered = informations[feasible]
     chosen, _ = _core.select_views(
-        hypothesis.information, offered, count, objective, tool_points=tool_points_m
+        estimate.information, offered, count, objective, tool_points=tool_points_m
     )
     worth, bound, efficiency = _core.certify_views(
-        hypothesis.information, offered, chosen, objective, tool_points=tool_points_m
+        estimate.information, offered, chosen, objective, tool_points=tool_points_m
     )
-    total: FloatArray = hypothesis.information + np.sum(offered[chosen], axis=0)
-    covariance = regular_information(total)[:6, :6]
+    total: FloatArray = estimate.information + np.sum(offered[chosen], axis=0)
+    covariance = prediction.predicted(regular_information(total)[:6, :6])
     return BatchPlan(
         tuple(pool.candidates[int(feasible[i])] for i in chosen), worth, bound, efficiency, covariance
     )

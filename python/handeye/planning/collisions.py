@@ -54,7 +54,9 @@ class Workspace:
     def __post_init__(self) -> None:
         lower = finite_array(self.lower_m, (3,), "workspace: lower_m")
         upper = finite_array(self.upper_m, (3,), "workspace: upper_m")
-        if (lower >= upper).any() or min(self.link_radius_m, self.tool_radius_m) < 0:
+        radii = self.link_radius_m, self.tool_radius_m
+        finite_array([self.floor_m, *radii], (3,), "workspace: floor and radii")
+        if (lower >= upper).any() or min(radii) < 0:
             raise InputError(
                 f"workspace: from {lower} to {upper}, expected a box with an inside, radii not negative",
                 code="out_of_range",
@@ -102,9 +104,12 @@ class Body:
         # The base itself stands on the floor.
         low = np.any(frames[:, 3:, 2, 3] - space.link_radius_m < space.floor_m, axis=1)
         low |= np.any(tools[:, :, 2] - space.tool_radius_m < space.floor_m, axis=1)
-        touching = self._touches_itself(frames, tools)
         low_limit, high_limit = self.arm.limits.T
         beyond = np.any((joints < low_limit) | (joints > high_limit), axis=1)
+        # The costliest question only of postures that nothing else speaks against.
+        left = np.flatnonzero(~(beyond | outside | low))
+        touching = np.zeros(len(joints), dtype=bool)
+        touching[left] = self._touches_itself(frames[left], tools[left])
         answers: list[str | None] = []
         for k in range(len(joints)):
             if beyond[k]:

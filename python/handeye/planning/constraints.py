@@ -10,7 +10,8 @@ from handeye.errors import InputError
 from handeye.planning.collisions import Body
 from handeye.planning.visibility import obstacles
 from handeye.robots import Arm
-from handeye.solving.estimate import Estimate, Sight
+from handeye.planning.prediction import Sight
+from handeye.solving.estimate import Estimate
 from handeye.types import Mounting
 from handeye.types.arrays import FloatArray, IndexArray
 
@@ -45,7 +46,9 @@ class ViewLimits:
 
     def __post_init__(self) -> None:
         near, far = self.distance_m
-        if not 0 < near < far < float("inf") or not 0 < self.tilt_rad < np.pi / 2 or self.margin_px < 0:
+        if not 0 < near < far < float("inf") or not (
+            0 < self.tilt_rad < np.pi / 2 and 0 <= self.margin_px < float("inf")
+        ):
             raise InputError(
                 f"views from {near} to {far} m, tilted up to {np.rad2deg(self.tilt_rad):.0f} deg, margin "
                 f"{self.margin_px} px: expected ranges with an inside",

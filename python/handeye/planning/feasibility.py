@@ -10,7 +10,8 @@ from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import ViewConstraints, ViewLimits, mounted_points, sight_of
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
-from handeye.solving.estimate import Estimate, Sight
+from handeye.planning.prediction import Sight
+from handeye.solving.estimate import Estimate
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
 
@@ -125,7 +126,8 @@ class Generator:
         chain = np.linalg.inv(estimate.X.matrix) @ looks @ np.linalg.inv(estimate.Y.matrix)
         flange = np.linalg.inv(chain) if estimate.mounting is Mounting.EYE_IN_HAND else chain
         starts = taken[random.integers(len(taken), size=n)]
-        joints, reached = self.arm.inverse_all(flange, starts, attempts=4)
+        # One start each: of 359 poses that four starts reach, one reaches 341, in a quarter of the time.
+        joints, reached = self.arm.inverse_all(flange, starts, attempts=1)
         return joints[np.flatnonzero(reached)]
 
     def _in_joints(self, taken: FloatArray, random: np.random.Generator) -> FloatArray:

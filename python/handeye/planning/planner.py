@@ -11,7 +11,8 @@ from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.policies import NextBestView, Policy, Situation
 from handeye.planning.stopping import State, Stop, StopRule, first_verdict
 from handeye.planning.travel import Travel
-from handeye.solving.estimate import Estimate, Estimator, Sight
+from handeye.planning.prediction import Sight, gains
+from handeye.solving.estimate import Estimate, Estimator
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
 from handeye.types.view import View
@@ -149,7 +150,8 @@ class Planner:
     def _scored(self, pool: Pool) -> FloatArray:
         if len(pool) == 0:
             return np.zeros(0)
-        return self._estimate.gains(
+        return gains(
+            self._estimate,
             self._options.criterion,
             pool.motions(self._measurements.mounting),
             self._options.sight,

@@ -11,14 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye import _core
-from handeye.errors import DegenerateError
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.visibility import obstacles
-from handeye.solving.estimate import Estimate, Sight
+from handeye.planning.prediction import Prediction, Sight
+from handeye.solving.estimate import Estimate
 from handeye.types.arrays import FloatArray
-
-# Candidates whose covariances are held in memory at a time.
-_BATCH = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +102,9 @@ def rank(
         return Ranking((), {}, 0)
     motions = pool.motions(estimate.mounting)
     hidden = obstacles(estimate, motions, sight)
+    prediction = Prediction(estimate, sight)
     if gains is None:
-        gains = estimate.gains(criterion, motions, sight, joints=pool.joints)
+        gains = prediction.gains(criterion, motions, pool.joints)
     infeasible = {
         candidate.name: why or "the gain cannot be computed"
         for candidate, why, gain in zip(pool.candidates, hidden, gains, strict=True)
@@ -118,55 +116,9 @@ def rank(
     ]
     chosen = order[:top]
     joints = None if pool.joints is None else pool.joints[chosen]
-    covariances = predicted_covariances(estimate, motions[chosen], sight, joints)
+    covariances = prediction.covariances(motions[chosen], joints)
     prospects = tuple(
         Prospect(pool.candidates[i], float(gains[i]), covariance)
         for i, covariance in zip(chosen, covariances, strict=True)
     )
     return Ranking(prospects, infeasible, int(usable.sum()))
-
-
-def predicted_covariances(
-    estimate: Estimate, motions: FloatArray, sight: Sight, joints: FloatArray | None = None
-) -> FloatArray:
-    """(N, 6, 6) covariance of the twist of X predicted after a view at each of motions (N, 4, 4).
-
-    `joints` (N, n) are the joint positions there, if the arm is known.
-
-    Raises
-    ------
-    DegenerateError
-        The information is singular.
-    """
-    jacobians = estimate.jacobians(joints)
-    before = np.zeros((6, 6))
-    after = np.zeros((len(motions), 6, 6))
-    try:
-        for weight, hypothesis in estimate.averaged:
-            predictor = estimate.predictor(hypothesis, sight)
-            before += weight * _hand_eye_covariance(hypothesis.information)
-            for first in range(0, len(motions), _BATCH):
-                batch = slice(first, first + _BATCH)
-                taught = predictor.informations(
-                    motions[batch], jacobians=None if jacobians is None else jacobians[batch]
-                )
-                information = hypothesis.information + taught
-                after[batch] += weight * _hand_eye_covariance(information)
-        root = np.linalg.cholesky(estimate.hand_eye_covariance)
-        share = root @ np.linalg.inv(np.linalg.cholesky(before))
-    except np.linalg.LinAlgError as error:
-        raise DegenerateError("the information of the views is singular") from error
-    return share @ after @ share.T
-
-
-def _hand_eye_covariance(information: FloatArray) -> FloatArray:
-    """Return the block (..., 6, 6) of X in the inverse of informations (..., n, n), never indefinite.
-
-    Scaled to a unit diagonal first, as metres, radians and pixels differ by many orders of magnitude; then by
-    Cholesky, ``(L L')^-1 = W' W`` with the columns of ``W = L^-1`` that belong to X.
-    """
-    scale = 1 / np.sqrt(np.diagonal(information, axis1=-2, axis2=-1))
-    root = np.linalg.cholesky(information * scale[..., :, None] * scale[..., None, :])
-    columns = np.eye(information.shape[-1])[:, :6]
-    half = np.linalg.solve(root, np.broadcast_to(columns, (*root.shape[:-1], 6))) * scale[..., None, :6]
-    return np.swapaxes(half, -1, -2) @ half

@@ -21,7 +21,7 @@ from handeye.planning.planner import PlannerOptions
 from handeye.planning.policies import Policy
 from handeye.planning.travel import Travel
 from handeye.robots import Arm
-from handeye.solving.estimate import Estimate
+from handeye.planning.prediction import Prediction
 from handeye.types.arrays import FloatArray, IndexArray
 
 
@@ -80,7 +80,7 @@ def refine(
     """Climb from the best candidates; return where it ended, as far as it led anywhere.
 
     Every posture on the way passes the constraints of the pool and is reached on a free straight path from
-    where the arm stands. The climb looks at the likeliest hypothesis about the robot's noise only, so what it
+    where the arm stands. The climb takes the estimate of X and Y at its word, so what it
     returns is to be scored like any candidate before it is taken.
 
     Parameters
@@ -125,7 +125,7 @@ def offered(refined: Sequence[Refined], arm: Arm) -> tuple[Candidate, ...]:
 
 
 class _Scorer:
-    """Scores postures under the likeliest hypothesis, as the policy weighs them."""
+    """Scores postures as the policy weighs them."""
 
     def __init__(
         self, constraints: ViewConstraints, policy: Policy, criterion: _core.Criterion, travel: Travel
@@ -136,10 +136,7 @@ class _Scorer:
             criterion,
             travel,
         )
-        estimate: Estimate = constraints.estimate
-        hypothesis = estimate.averaged[0][1]
-        self._belief = _core.Belief(hypothesis.information)
-        self._predictor = estimate.predictor(hypothesis, constraints.sight)
+        self._prediction = Prediction(constraints.estimate, constraints.sight)
 
     def __call__(self, joints: FloatArray) -> FloatArray:
         """(N,) worth of postures (N, n); NaN for what cannot be taken."""
@@ -147,9 +144,8 @@ class _Scorer:
         worth = np.full(len(joints), np.nan)
         if len(passed) > 0:
             some = joints[passed]
-            jacobians = self._constraints.estimate.jacobians(some)
             motions = self._constraints.motions(some)
-            gains = self._predictor.gains(self._belief, self._criterion, motions, jacobians=jacobians)
+            gains = self._prediction.gains(self._criterion, motions, some)
             weighed = self._policy.worth(gains, self._travel.seconds(some))
             worth[passed] = gains if weighed is None else weighed
         return worth

@@ -2,13 +2,15 @@
 
 import bisect
 import textwrap
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from handeye.errors import InputError
 from handeye.printing import ruler
-from handeye.printing.boards import Ink, Measures, board_of, ink_of
+from handeye.printing.ink import Ink, ink_of
 from handeye.printing.paper import Paper
 from handeye.printing.shapes import Drawing, Shape, Words
 from handeye.types import Target
@@ -19,7 +21,7 @@ MARGIN_MM = 6.0
 _TEXT_MM = 2.5
 _LINE_MM = 3.8
 # Mean width of a letter over its height, of the wider of the two fonts.
-_LETTER = 0.58
+_LETTER = 0.63
 # A measure that is chosen for the paper is a multiple of the first of these of which it is at least ten.
 _STEPS_MM = (1.0, 0.5, 0.1)
 _MOST_STEPS = 5000
@@ -68,7 +70,7 @@ def lay_out(target: Target, paper: Paper) -> Sheet:
     InputError
         It does not fit, or its family cannot be drawn.
     """
-    ink, caption = ink_of(target), board_of(target.family).caption(target)
+    ink, caption = ink_of(target), target.caption
     size = ink.high - ink.low
     for sheet in (paper, paper.turned):
         room = _Room(sheet, caption, size, ink.quiet_mm)
@@ -82,7 +84,7 @@ def lay_out(target: Target, paper: Paper) -> Sheet:
     )
 
 
-def largest(family: str, asked: Measures, paper: Paper) -> Target:
+def largest(family: str, asked: Mapping[str, Any], paper: Paper) -> Target:
     """Return the target of a family with the largest measures that fit on a sheet, in whole millimetres.
 
     Raises
@@ -90,10 +92,10 @@ def largest(family: str, asked: Measures, paper: Paper) -> Target:
     InputError
         Nothing of that kind fits.
     """
-    board = board_of(family)
-    caption = board.caption(board.usual(1.0, asked)) + _LONGER
+    member = Target.member(family)
+    caption = member.usual(1.0, asked).caption + _LONGER
     # Everything grows in proportion to the one measure, apart from what was asked for in millimetres.
-    small, big = (board.ink(board.usual(scale, asked)) for scale in (1.0, 2.0))
+    small, big = (ink_of(member.usual(scale, asked)) for scale in (1.0, 2.0))
     size_slope, quiet_slope = _size(big) - _size(small), big.quiet_mm - small.quiet_mm
 
     def fits(scale_m: float) -> bool:
@@ -105,7 +107,7 @@ def largest(family: str, asked: Measures, paper: Paper) -> Target:
         multiples = range(1, _MOST_STEPS + 1)
         most = bisect.bisect_left(multiples, x=True, key=lambda n: not fits(n * step / 1000))
         if most >= 10:
-            return board.usual(round(most * step / 1000, 9), asked)
+            return member.usual(round(most * step / 1000, 9), asked)
     raise InputError(
         f"{family}: does not fit on {paper.name}", code="does_not_fit", hint="fewer rows and columns"
     )

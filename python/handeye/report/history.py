@@ -7,10 +7,11 @@ import numpy as np
 from handeye.errors import HandeyeError, InputError
 from handeye.report.document import Attempt, CurvePoint, Request, Within
 from handeye.robots import ArmKinematics, arm_kinematics, open_arm
-from handeye.session.configuration import Configuration
 from handeye.session.deciding import START_VIEWS
+from handeye.session.journal import read_journal, read_settings
 from handeye.session.request import reach
-from handeye.session.store import JOURNAL_FILE, is_session, read_journal, read_settings
+from handeye.session.settings import Configuration
+from handeye.session.store import is_session
 from handeye.solving import Measurements, make_estimator
 from handeye.types import Recording
 from handeye.types.calibration import ModelName
@@ -26,7 +27,7 @@ def arm_of(folder: Path, recording: Recording, model: ModelName) -> ArmKinematic
     """
     if not is_session(folder) or model is not ModelName.AUTO:
         return None
-    asked = Configuration.from_dict(read_settings(folder).get("configuration"))
+    asked = Configuration.from_dict(read_settings(folder).asked.get("configuration"))
     joints_known = all(view.joints_rad is not None for view in recording.views)
     if asked.robot is None or not asked.joints_err or not joints_known:
         return None
@@ -69,10 +70,9 @@ def attempts(folder: Path) -> list[Attempt]:
     """Return the attempts of a session that brought no view; none where the folder is no session."""
     if not is_session(folder):
         return []
-    entries, _ = read_journal(folder / JOURNAL_FILE)
     return [
         Attempt(label=entry.label, failure=entry.failure.value, detail=entry.detail)
-        for entry in entries
+        for entry in read_journal(folder).entries
         if entry.failure is not None
     ]
 
@@ -81,7 +81,7 @@ def request(folder: Path, within: Within) -> Request | None:
     """Return what a session was asked for; None where the folder is no session or nothing was asked."""
     if not is_session(folder):
         return None
-    asked = Configuration.from_dict(read_settings(folder).get("configuration"))
+    asked = Configuration.from_dict(read_settings(folder).asked.get("configuration"))
     if asked.accuracy_mm is None or asked.accuracy_deg is None:
         return None
     return Request(

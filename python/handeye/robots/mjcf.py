@@ -22,6 +22,8 @@ from handeye.types.pose import Pose
 _ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 _DEFAULT = "main"
 # Makes bodies that do not stand in the file.
+# No arm has as many; the time that reading takes grows with the square of it.
+MAX_JOINTS_IN_A_ROW = 100
 _UNSUPPORTED = frozenset({"frame", "replicate", "attach", "composite", "flexcomp"})
 
 
@@ -145,6 +147,8 @@ def _walk(body: Element, joints: tuple[Joint, ...], pending: Pose, default: str,
     default = body.attributes.get("childclass", default)
     rest = pending @ _placed(body, where, model.compiler)
     own = [child for child in body.children if child.tag in {"joint", "freejoint"}]
+    if len(joints) + len(own) > MAX_JOINTS_IN_A_ROW:
+        raise _unusable(body, f"{where}: more than {MAX_JOINTS_IN_A_ROW} joints one after the other")
     for element in own:
         joint, offset = _joint(element, where, default, model, f"{name or 'body'}_{len(joints) + 1}")
         joints = (

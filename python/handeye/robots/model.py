@@ -1,5 +1,6 @@
 """An arm: its joints, where its flange is, how that moves, and which joint positions reach a pose."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -124,6 +125,23 @@ class Arm:
     def velocities(self) -> FloatArray:
         """(n,) largest speeds, radians or metres per second; infinite where unknown."""
         return np.array([joint.velocity for joint in self.joints], dtype=float)
+
+    @property
+    def fingerprint(self) -> str:
+        """Checksum of everything that motions follow from: where the joints are, how far and fast they go."""
+        digest = hashlib.blake2b(digest_size=16)
+        for joint in self.joints:
+            digest.update(repr((joint.name, joint.axis, joint.sliding)).encode())
+            digest.update(repr((joint.lower, joint.upper, joint.velocity)).encode())
+            digest.update(joint.placement.matrix.tobytes())
+        digest.update(self.T_last_flange.matrix.tobytes())
+        return digest.hexdigest()
+
+    @property
+    def reach_m(self) -> float:
+        """A length that the flange is at most away from the first joint, sliding joints apart."""
+        offsets = [joint.placement.translation for joint in self.joints[1:]]
+        return float(sum(np.linalg.norm(o) for o in [*offsets, self.T_last_flange.translation]))
 
     def with_flange(self, T_flange_tool: Pose, name: str = "tool") -> "Arm":
         """Return the arm with another frame at its end, `T_flange_tool` away from the flange of this one."""

@@ -1,23 +1,27 @@
 """One attempt at one view: go there, see where the arm is, take the picture, find the target, judge it."""
 
 import hashlib
+import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 
-from handeye.cameras.protocol import Frame, Grey, ImageSource
+from handeye.cameras.protocol import BAD_FRAME, Frame, Grey, ImageSource, checked_frame
 from handeye.detection import Detection, NotFound, Prediction, Reason, detect
-from handeye.errors import DeviceError, HandeyeError
+from handeye.errors import DeviceError, HandeyeError, InputError
 from handeye.planning.collisions import Workspace
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Reading, Robot
+from handeye.robots.reading import BAD_READING, checked_reading, typed_reading
 from handeye.robots.replay import is_near
+from handeye.session.calls import Calls
 from handeye.session.entry import Failure
-from handeye.session.patience import within
+from handeye.session.safety import body_of, objection_to_motion
+from handeye.solving import Estimate
 from handeye.solving.measurements import MIN_POINTS
 from handeye.types import Camera, Pose, Target
 
@@ -25,6 +29,10 @@ from handeye.types import Camera, Pose, Target
 _POOR = frozenset(
     {Reason.UNDEREXPOSED, Reason.OVEREXPOSED, Reason.LOW_CONTRAST, Reason.BLURRED, Reason.IMAGE_TOO_SMALL}
 )
+
+# A goal this near is where the arm stands already; a pose this near to the one before is the same.
+MOVED_M, MOVED_RAD = 1e-3, 5e-3
+STILL_M, STILL_RAD = 1e-5, 1e-4
 
 
 @dataclass(frozen=True)
@@ -36,6 +44,15 @@ class Patience:
     grab_s: float = 10.0
     reached_m: float = 0.002
     reached_rad: float = 0.01
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not value > 0:
+                raise InputError(f"{name} {value}, expected above zero", code="out_of_range")
+
+    def without_clock(self) -> "Patience":
+        """Return the same without limits of time: simulated drivers answer, and no clock is looked at."""
+        return replace(self, move_s=math.inf, read_s=math.inf, grab_s=math.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +70,13 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class Missed:
-    """Why an attempt brought nothing, and whether the arm moved."""
+    """Why an attempt brought nothing, whether the arm moved, and where it said that it stood afterwards."""
 
     failure: Failure
     detail: str
     moved: bool
     digest: str | None = None
+    standing: Reading | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +97,10 @@ class Cell:
         Asked before every motion; False to leave it.
     solids
         Shapes of the arm's links, where they are known.
+    speed_rad_s
+        No goal is sent that is faster.
+    by_hand
+        Whether a person moves the arm, who sees the way and may not know the joints.
     """
 
     robot: Robot
@@ -90,23 +112,40 @@ class Cell:
     patience: Patience = field(default_factory=Patience)
     confirm: Callable[[Goal], bool] | None = None
     solids: SolidLinks | None = None
+    speed_rad_s: float = math.inf
+    by_hand: bool = False
+    robot_calls: Calls = field(default_factory=lambda: Calls("robot"))
+    camera_calls: Calls = field(default_factory=lambda: Calls("camera"))
 
-    def stop(self) -> None:
-        """Stop the arm through its driver; a driver that fails even then stops nothing else."""
+    def stop(self) -> str | None:
+        """Stop the arm, also while a call runs; say why that is not confirmed, None if it is."""
         try:
-            within(self.patience.read_s, "robot", self.robot.stop)
-        except DeviceError:
-            return
+            self.robot_calls.beside(self.patience.read_s, self.robot.stop)
+        except DeviceError as error:
+            return error.message
+        return None
 
-    def read(self) -> Reading:
-        """Return where the robot says it is.
+    def read(self, expected: Pose | None = None) -> Reading:
+        """Return where the robot says it is; where something moves, only what may be true.
 
         Raises
         ------
         DeviceError
-            It does not say.
+            It does not say, or what it says cannot be true. `expected` helps to name what is wrong.
         """
-        return within(self.patience.read_s, "robot", self.robot.read_pose)
+        answer = self.robot_calls.run(self.patience.read_s, self.robot.read_pose)
+        if self.arm is None or self.workspace is None:
+            return typed_reading(answer)
+        return checked_reading(answer, self.arm, joints_needed=not self.by_hand, expected=expected)
+
+    def objection(self, goal: Goal, standing: Reading, estimate: Estimate | None) -> str | None:
+        """Say why a goal must not be sent from where the arm stands, None if it may be."""
+        if self.workspace is None:
+            return None  # nothing moves
+        if self.arm is None:
+            return "the arm is not known, and no way can be checked"
+        body = body_of(self.arm, self.workspace, self.solids, estimate)
+        return objection_to_motion(body, goal, standing.joints_rad, self.speed_rad_s)
 
 
 def attempt(
@@ -115,6 +154,7 @@ def attempt(
     digests: frozenset[str],
     timings: dict[str, float],
     foresee: Callable[[Pose], Prediction | None] | None = None,
+    estimate: Estimate | None = None,
 ) -> Seen | Missed:
     """Try to take one view.
 
@@ -123,55 +163,126 @@ def attempt(
     cell
         Where.
     goal
-        Where to go; it has been checked where it was chosen, and the workspace is checked here again.
+        Where to go; checked here from where the arm really stands, however it was chosen.
     digests
         Of the images so far: a picture that comes again is no new picture.
     timings
         Filled with the seconds that each part took.
     foresee
         Tells from the pose read back where in the image the target should be.
+    estimate
+        What is believed: what is mounted on the arm takes part in the check.
     """
-    if cell.workspace is not None and not cell.workspace.contains(goal.T_base_flange.translation):
-        return Missed(Failure.MOTION_REFUSED, "the goal is outside the stated workspace", moved=False)
-    if cell.confirm is not None and not cell.confirm(goal):
-        return Missed(Failure.NOT_CONFIRMED, "not confirmed", moved=False)
     started = time.monotonic()
-    try:
-        within(cell.patience.move_s, "robot", cell.robot.move_to, goal)
-        reading = cell.read()
-    except DeviceError as error:
-        if error.code == "motion_refused":
-            return Missed(Failure.MOTION_REFUSED, error.message, moved=False)
-        cell.stop()
-        return Missed(Failure.ROBOT_FAILED, error.message, moved=False)
+    reading = _go(cell, goal, estimate)
+    if isinstance(reading, Missed):
+        return reading
     timings["move"] = time.monotonic() - started
     note = ""
     if not is_near(
         goal.T_base_flange, reading.T_base_flange, cell.patience.reached_m, cell.patience.reached_rad
     ):
-        difference = goal.T_base_flange.inverse() @ reading.T_base_flange
-        off = 1e3 * float(np.linalg.norm(difference.translation))
-        turn = float(np.rad2deg(difference.rotation_angle_rad))
-        note = f"ended {off:.1f} mm and {turn:.2f} deg from the goal; the pose read back is used"
-        if cell.workspace is not None and not cell.workspace.contains(reading.T_base_flange.translation):
+        note = f"ended {_off(goal, reading)} from the goal; the pose read back is used"
+        why = _not_there(cell, reading, estimate)
+        if why is not None:
             cell.stop()
-            return Missed(Failure.ELSEWHERE, f"{note.split(';')[0]}, outside the workspace", moved=True)
+            return Missed(Failure.ELSEWHERE, f"{note.split(';')[0]}: {why}", moved=True, standing=reading)
     started = time.monotonic()
     try:
-        frame = within(cell.patience.grab_s, "camera", cell.source.grab, goal.label)
+        frame = checked_frame(cell.camera_calls.run(cell.patience.grab_s, cell.source.grab, goal.label))
     except DeviceError as error:
-        failure = Failure.CAMERA_TIMEOUT if error.code == "timeout" else Failure.CAMERA_FAILED
-        return Missed(failure, error.message, moved=True)
+        known = {"timeout": Failure.CAMERA_TIMEOUT, "busy": Failure.CAMERA_TIMEOUT}
+        known |= {BAD_FRAME: Failure.BAD_IMAGE}
+        return Missed(
+            known.get(error.code, Failure.CAMERA_FAILED), error.message, moved=True, standing=reading
+        )
     timings["grab"] = time.monotonic() - started
     started = time.monotonic()
     predicted = None if foresee is None else foresee(reading.T_base_flange)
     found = _look(cell, frame, digests, predicted)
     timings["detect"] = time.monotonic() - started
     if isinstance(found, Missed):
-        return found
+        return replace(found, standing=reading)
     detection, digest = found
     sure = frame.points is not None and frame.points.labels_known
     return Seen(reading, detection, frame.image, digest, frame.timestamp_s, note, sure)
+
+
+def _go(cell: Cell, goal: Goal, estimate: Estimate | None) -> Reading | Missed:
+    """See where the arm stands, check the way, go, and see where it stands then."""
+    try:
+        # A camera that still hangs would not see what comes; a robot that does must not be told anything new.
+        cell.camera_calls.wait(cell.patience.grab_s)
+    except DeviceError as error:
+        return Missed(Failure.CAMERA_TIMEOUT, error.message, moved=False)
+    try:
+        before = cell.read()
+    except DeviceError as error:
+        return Missed(_robot_failure(error), error.message, moved=False)
+    why = cell.objection(goal, before, estimate)
+    if why is not None:
+        return Missed(Failure.MOTION_REFUSED, why, moved=False, standing=before)
+    if cell.confirm is not None and not cell.confirm(goal):
+        return Missed(Failure.NOT_CONFIRMED, "not confirmed", moved=False, standing=before)
+    try:
+        cell.robot_calls.run(cell.patience.move_s, cell.robot.move_to, goal)
+    except DeviceError as error:
+        return _after_failed_motion(cell, before, error)
+    try:
+        after = cell.read(goal.T_base_flange)
+    except DeviceError as error:
+        cell.stop()
+        return Missed(_robot_failure(error), error.message, moved=True)
+    if not is_near(before.T_base_flange, goal.T_base_flange, MOVED_M, MOVED_RAD) and is_near(
+        before.T_base_flange, after.T_base_flange, STILL_M, STILL_RAD
+    ):
+        return Missed(
+            Failure.NOT_MOVED,
+            f"the robot reports success, but its pose is the one before, {_off(goal, after)} from the goal",
+            moved=False,
+            standing=after,
+        )
+    return after
+
+
+def _after_failed_motion(cell: Cell, before: Reading, error: DeviceError) -> Missed:
+    """Stop the arm, unless it only would not go, and see where it stands."""
+    detail, refused = error.message, error.code == "motion_refused"
+    if not refused:
+        stopped = cell.stop()
+        if stopped is not None:
+            detail = f"{detail}; stop: {stopped}"
+    try:
+        # The call may come back only now, and is waited for: one command at a time.
+        cell.robot_calls.wait(cell.patience.move_s)
+        after = cell.read()
+    except DeviceError as second:
+        return Missed(Failure.ROBOT_FAILED, f"{detail}; then {second.message}", moved=True)
+    moved = not is_near(before.T_base_flange, after.T_base_flange, STILL_M, STILL_RAD)
+    failure = Failure.MOTION_REFUSED if refused else Failure.ROBOT_FAILED
+    return Missed(failure, detail, moved=moved, standing=after)
+
+
+def _robot_failure(error: DeviceError) -> Failure:
+    return Failure.BAD_READING if error.code in {BAD_READING, "no_joints"} else Failure.ROBOT_FAILED
+
+
+def _not_there(cell: Cell, reading: Reading, estimate: Estimate | None) -> str | None:
+    """Say what is wrong with where a motion ended, None for nothing."""
+    if cell.workspace is None or cell.arm is None:
+        return None
+    if not cell.workspace.contains(reading.T_base_flange.translation):
+        return "outside the workspace"
+    if reading.joints_rad is None:
+        return None
+    body = body_of(cell.arm, cell.workspace, cell.solids, estimate)
+    return body.obstacles(np.array(reading.joints_rad)[np.newaxis])[0]
+
+
+def _off(goal: Goal, reading: Reading) -> str:
+    difference = goal.T_base_flange.inverse() @ reading.T_base_flange
+    millimetres = 1e3 * float(np.linalg.norm(difference.translation))
+    return f"{millimetres:.1f} mm and {np.rad2deg(difference.rotation_angle_rad):.2f} deg"
 
 
 def _look(

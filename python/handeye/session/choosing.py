@@ -60,13 +60,13 @@ class ArmChooser:
         self._generator = Generator(arm, workspace, limits or ViewLimits(), solids=solids)
 
     @property
-    def kinematics(self) -> ArmKinematics:
-        """The arm; its controller reports poses in the frames of the description."""
-        return ArmKinematics(self._arm)
+    def kinematics(self) -> ArmKinematics | None:
+        """The arm, reported in the frames of its description; None if nobody tells joints."""
+        return ArmKinematics(self._arm) if self._start.posture_known else None
 
     def choose(self, situation: Situation) -> Step | Halt:
         """Return the next step, or why there is none."""
-        missed, estimate = situation.missed, situation.estimate
+        missed, estimate = situation.counted, situation.estimate
         if len(missed) >= self._wish.failures_in_a_row:
             last = missed[-1]
             return Halt(
@@ -86,7 +86,7 @@ class ArmChooser:
 
     def _same_place(self, situation: Situation) -> Step | None:
         """Return another try at the last goal, if it failed for no reason of its own."""
-        missed = situation.missed
+        missed = situation.counted
         if not missed or missed[-1].failure not in TRANSIENT:
             return None
         last = missed[-1]
@@ -97,7 +97,7 @@ class ArmChooser:
         return Step(goal, "retry", {"after": last.number}, situation.estimate)
 
     def _starting(self, situation: Situation) -> Step | Halt:
-        views, missed, estimate = situation.views, situation.missed, situation.estimate
+        views, missed, estimate = situation.views, situation.counted, situation.estimate
         if not views and missed and missed[-1].failure is Failure.NOT_FOUND:
             tries = sum(1 for entry in missed if entry.failure is Failure.NOT_FOUND)
             if tries >= self._wish.tries_at_a_place:
@@ -107,7 +107,8 @@ class ArmChooser:
                     "camera sees the whole target, and begin again",
                 )
         places = len({entry.goal_joints for entry in missed})
-        found = starting_goal(self._start, views, places, self._camera, self._body)
+        body = self._body if estimate is None else self._generator.body(estimate)
+        found = starting_goal(self._start, views, places, self._camera, body, self._standing(situation))
         if found is None:
             return Halt(
                 EndReason.NO_START if estimate is None else EndReason.NO_CANDIDATE,
@@ -124,13 +125,17 @@ class ArmChooser:
         lost = np.array(last.goal_joints)
         nearest = postures[int(np.argmin(np.abs(postures - lost).max(axis=1)))]
         joints = 0.5 * (lost + nearest)
-        if self._generator.body(estimate).obstacle_on_path(self._standing(situation), joints) is not None:
+        standing = self._standing(situation)
+        if (
+            standing is not None
+            and self._generator.body(estimate).obstacle_on_path(standing, joints) is not None
+        ):
             return None
         goal = self._goal(situation, Pose(self._arm.forward(joints)), tuple(joints.tolist()))
         return Step(goal, "nudge", {"after": last.number}, estimate)
 
     def _planned(self, situation: Situation, estimate: Estimate) -> Step | Halt:
-        standing = np.array(self._standing(situation))
+        standing = self._standing(situation)
         random = np.random.default_rng([self._wish.seed, 4, len(situation.entries)])
         postures = [situation.joints(view) for view in reversed(situation.views)]
         shunned = [
@@ -144,7 +149,10 @@ class ArmChooser:
             stop_rules=self._wish.rules(),
             sight=drawn.sight,
             seed=self._wish.seed,
-            travel=Travel(standing, np.minimum(self._arm.velocities, self._wish.speed_rad_s)),
+            travel=Travel(
+                np.array(self._start.joints_rad if standing is None else standing),
+                np.minimum(self._arm.velocities, self._wish.speed_rad_s),
+            ),
         )
         planner = Planner(situation.measurements, drawn.pool, estimator_of(estimate), options)
         turned_down = dict(drawn.turned_down)
@@ -160,7 +168,12 @@ class ArmChooser:
                 answer = planner.ask()
         while not isinstance(answer, Stop):
             name = answer.candidate.name
-            why = drawn.constraints.body.obstacle_on_path(standing, joints_of[name])
+            # Where a person moves the arm and does not tell its posture, the person sees the way.
+            why = (
+                None
+                if standing is None
+                else drawn.constraints.body.obstacle_on_path(standing, joints_of[name])
+            )
             if why is None:
                 more: dict[str, Any] = {"turned_down": turned_down, "margin_px": drawn.sight.margin_px}
                 if name in climbed:
@@ -177,12 +190,22 @@ class ArmChooser:
         return halt_of(answer)
 
     def _goal(self, situation: Situation, pose: Pose, joints: tuple[float, ...]) -> Goal:
-        number, attempt = 1 + len(situation.views), 1 + len(situation.missed)
-        return Goal(f"view_{number:02d}.{attempt}", pose, joints, self._wish.speed_rad_s)
+        label = f"view_{situation.next_number:02d}.{1 + len(situation.missed)}"
+        return Goal(label, pose, joints, self._speed_rad_s)
 
-    def _standing(self, situation: Situation) -> tuple[float, ...]:
-        """Return the joints where the arm stands, as far as the journal knows."""
+    @property
+    def _speed_rad_s(self) -> float:
+        """What was asked for, or what the slowest turning joint can do, if that is less."""
+        turning = self._arm.velocities[~np.array(self._arm.sliding)]
+        return min([self._wish.speed_rad_s, *turning.tolist()])
+
+    def _standing(self, situation: Situation) -> tuple[float, ...] | None:
+        """Return the joints where the arm stands, as far as the journal knows; None if nobody tells."""
+        if not self._start.posture_known:
+            return None
         for entry in reversed(situation.entries):
+            if entry.standing_rad is not None:
+                return entry.standing_rad
             if entry.view is not None:
                 return situation.joints(entry.view)
             if entry.moved:

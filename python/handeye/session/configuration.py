@@ -1,162 +1,34 @@
-"""Everything that was asked for, as it is written into a session, and the cell that follows from it."""
+"""The cell that follows from what was asked for: its drivers, where its arm stands, and its session."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from handeye.cameras.render import Appearance
 from handeye.cameras.simulated import Optics
 from handeye.errors import InputError
 from handeye.importing import SourceOptions, open_folder
-from handeye.planning.collisions import Workspace
-from handeye.planning.constraints import ViewLimits
-from handeye.planning.policies import make_policy
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm, open_arm, shipped_arms
 from handeye.robots.protocol import Goal
 from handeye.robots.replay import ReplayRobot
 from handeye.robots.shapes import read_shapes
-from handeye.robots.simulated import ArmErrors, SimulatedArm
-from handeye.session.attempt import Cell, Patience
+from handeye.robots.simulated import SimulatedArm
+from handeye.session.attempt import Cell
 from handeye.session.choosing import ArmChooser
 from handeye.session.deciding import Chooser
 from handeye.session.drivers import REPLAY, Person, open_camera, open_robot, replayed_camera
-from handeye.session.faults import FaultRates
+from handeye.session.entry import Entry
 from handeye.session.loop import Progress, Session
 from handeye.session.recorded import RecordedChooser
-from handeye.session.simulated import SimulationOptions, simulated_cell, usual_errors
+from handeye.session.safety import body_of
+from handeye.session.settings import Collisions, Configuration, check_fingerprints, fingerprints, read_start
+from handeye.session.simulated import SimulationOptions, simulated_cell
 from handeye.session.starting import Start
 from handeye.session.store import SessionStore, create_session, open_session
-from handeye.session.wish import Wish
-from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth, View
-from handeye.types.calibration import ModelName
-from handeye.types.plain import read_document
-
-SIMULATED = "simulated"
-
-
-class Collisions(StrEnum):
-    """By what it is judged whether the links of an arm touch one another."""
-
-    AUTO = "auto"
-    """Their shapes where the description and the extra `meshes` have them, capsules otherwise."""
-    MESHES = "meshes"
-    CAPSULES = "capsules"
-
-
-@dataclass(frozen=True)
-class Simulation:
-    """What is wrong in a simulated cell, in the units of `ArmErrors` and `Appearance`."""
-
-    errors: ArmErrors = field(default_factory=usual_errors)
-    faults: FaultRates | None = None
-    blur_px: float = 0.6
-    pixel_noise: float = 2.0
-    occluded_share: float = 0.0
-    points_only: float | None = None
-    camera_error: float = 1.0
-    hang_s: float = 60.0
-
-
-@dataclass(frozen=True)
-class Configuration:
-    """A run, in plain values.
-
-    Parameters
-    ----------
-    robot
-        Name of a shipped arm, or a URDF file; None for a replay of an arm that is not known.
-    driver, images
-        Specifications of the drivers, see `handeye.session.drivers`.
-    workspace_m
-        Corners of the box that no motion may leave; None only for a simulated cell.
-    collisions
-        What links are judged by; once a session has begun it is no longer `auto`.
-    start_rad
-        Joints to start from, for an arm that is simulated; others start where they stand.
-    """
-
-    robot: str | None
-    driver: str = SIMULATED
-    images: str = SIMULATED
-    mounting: Mounting = Mounting.EYE_IN_HAND
-    accuracy_mm: float | None = 0.5
-    accuracy_deg: float | None = 0.05
-    most_views: int = 20
-    seed: int = 0
-    model: ModelName = ModelName.AUTO
-    policy: str = "next_best_view"
-    speed_rad_s: float = 0.5
-    failures_in_a_row: int = 10
-    joints_err: bool = True
-    refine: bool = True
-    workspace_m: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
-    floor_m: float = 0.0
-    collisions: Collisions = Collisions.AUTO
-    limits: ViewLimits = field(default_factory=ViewLimits)
-    patience: Patience = field(default_factory=Patience)
-    simulation: Simulation = field(default_factory=Simulation)
-
-    @property
-    def is_simulated(self) -> bool:
-        """Whether nothing moves."""
-        return self.driver == SIMULATED
-
-    @property
-    def is_replay(self) -> bool:
-        """Whether a recording is gone through again."""
-        return self.driver.partition(":")[0] == REPLAY
-
-    def wish(self) -> Wish:
-        """Return what is asked for."""
-        return Wish(
-            self.accuracy_mm,
-            self.accuracy_deg,
-            self.most_views,
-            self.seed,
-            ModelName(self.model),
-            self.failures_in_a_row,
-            speed_rad_s=self.speed_rad_s,
-            joints_err=self.joints_err,
-            refine=self.refine,
-            policy=make_policy(self.policy),
-        )
-
-    def workspace(self) -> Workspace:
-        """Return the stated workspace.
-
-        Raises
-        ------
-        InputError
-            None is stated.
-        """
-        if self.workspace_m is None:
-            raise InputError(
-                "no workspace is stated, and without one nothing moves",
-                code="no_workspace",
-                hint="state the box that the flange may move in, in the frame of the robot's base",
-            )
-        lower, upper = self.workspace_m
-        return Workspace(np.array(lower), np.array(upper), self.floor_m)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON; `from_dict` reads them back."""
-        return msgspec.to_builtins(self)
-
-    @classmethod
-    def from_dict(cls, data: object) -> "Configuration":
-        """Read what `to_dict` wrote.
-
-        Raises
-        ------
-        InputError
-            A missing or unusable field.
-        """
-        return read_document(data, cls, "settings")
+from handeye.types import Camera, Mounting, Recording, Target, Truth, View
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +122,11 @@ def prepare(
     if configuration.is_replay:
         return _replayed(configuration, camera, confirm)
     if configuration.robot is None:
-        raise InputError("no arm is named", code="missing_value", hint="only a replay does without")
+        raise InputError(
+            "no arm is named",
+            code="missing_value",
+            hint=f"name it with --robot: {', '.join(shipped_arms())}, or its URDF or MJCF file",
+        )
     arm = open_arm(configuration.robot)
     solids = _solids(configuration, arm)
     configuration = replace(
@@ -262,13 +138,23 @@ def prepare(
         raise InputError("a real cell needs camera and target", code="missing_value")
     workspace = configuration.workspace()
     person = person or Person(_nobody, lambda _: None)
-    robot = open_robot(configuration.driver, person)
-    source = open_camera(configuration.images, robot, person)
-    cell = Cell(robot, source, arm, workspace, camera, target, configuration.patience, confirm, solids)
+    robot = open_robot(configuration.driver, person, arm, joints_told=_told(start))
+    source = open_camera(configuration.images, robot, person, configuration.patience.grab_s)
+    cell = Cell(
+        robot,
+        source,
+        arm,
+        workspace,
+        camera,
+        target,
+        configuration.patience,
+        confirm,
+        solids,
+        configuration.speed_rad_s,
+        by_hand=configuration.by_hand,
+    )
     if start is None:
-        reading = cell.read()
-        joints = reading.joints_rad or tuple(arm.inverse(reading.T_base_flange).tolist())
-        start = Start(reading.T_base_flange, joints)
+        start = _standing(cell, arm)
     recording = Recording(f"session with {arm.name}", configuration.mounting, camera, target, ())
     return Prepared(configuration, cell, start, recording)
 
@@ -288,7 +174,9 @@ def begin(prepared: Prepared, folder: Any, progress: Progress | None = None) -> 
         settings["start"] = {
             "T_base_flange": prepared.start.T_base_flange.to_list(),
             "joints_rad": list(prepared.start.joints_rad),
+            "posture_known": prepared.start.posture_known,
         }
+    settings |= fingerprints(prepared.cell.arm, prepared.recorded)
     chooser = prepared.chooser()
     store = create_session(folder, prepared.recording, settings)
     return Session(prepared.cell, store, chooser, prepared.configuration.wish(), progress), store
@@ -313,7 +201,9 @@ def go_on(
     store = open_session(folder)
     try:
         configuration = Configuration.from_dict(store.settings.get("configuration"))
-        start = None if configuration.is_replay else read_start(store.settings)
+        begun = any(entry.view is not None for entry in store.entries) or configuration.is_simulated
+        # Before the first view the arm may be driven elsewhere, and begins from there.
+        start = read_start(store.settings) if begun and not configuration.is_replay else None
         recording = store.recording
         prepared = prepare(
             configuration,
@@ -323,9 +213,9 @@ def go_on(
             confirm=confirm,
             start=start,
         )
+        check_fingerprints(store.settings, fingerprints(prepared.cell.arm, prepared.recorded))
         if prepared.hidden_arm is not None and start is not None:
-            standing = next((e.goal_joints for e in reversed(store.entries) if e.moved), start.joints_rad)
-            prepared.hidden_arm.place(standing)
+            prepared.hidden_arm.place(_left_at(store.entries) or start.joints_rad)
         session = Session(prepared.cell, store, prepared.chooser(), configuration.wish(), progress)
     except BaseException:
         store.close()
@@ -333,22 +223,65 @@ def go_on(
     return session, store, prepared
 
 
-def read_start(settings: Mapping[str, Any]) -> Start:
-    """Return where the arm stood when a session began.
+def _left_at(entries: Sequence[Entry]) -> tuple[float, ...] | None:
+    """Return the joints at which a simulated arm was left; None if it had not moved."""
+    for entry in reversed(entries):
+        if entry.standing_rad is not None:
+            return entry.standing_rad
+        if entry.moved:
+            return entry.goal_joints
+    return None
+
+
+def _told(start: Start | None) -> bool | None:
+    return None if start is None else start.posture_known
+
+
+def _standing(cell: Cell, arm: Arm) -> Start:
+    """Return where the arm stands, if that is a place from which it may go.
+
+    Raises
+    ------
+    DeviceError
+        The robot does not say, or what it says cannot be true.
+    InputError
+        It stands where no motion may go.
+    SolveError
+        Nobody tells the joints, and the description does not reach the pose.
+    """
+    reading = cell.read()
+    if reading.joints_rad is None:
+        joints = arm.inverse(reading.T_base_flange)
+        return _safe(Start(reading.T_base_flange, tuple(joints.tolist()), posture_known=False), cell)
+    low, high = arm.limits.T
+    # At a limit encoders may read a little beyond it.
+    joints = np.clip(reading.joints_rad, low, high)
+    return _safe(Start(reading.T_base_flange, tuple(joints.tolist())), cell)
+
+
+def _safe(start: Start, cell: Cell) -> Start:
+    """Return a start if it may be a goal too.
 
     Raises
     ------
     InputError
-        The settings do not say.
+        It may not.
     """
-    document = read_document(settings.get("start"), _StartDocument, "settings: start")
-    return Start(Pose(document.T_base_flange), tuple(document.joints_rad))
-
-
-@dataclass(frozen=True)
-class _StartDocument:
-    T_base_flange: list[list[float]]
-    joints_rad: list[float]
+    if cell.arm is None or cell.workspace is None:
+        return start
+    if start.posture_known:
+        body = body_of(cell.arm, cell.workspace, cell.solids, None)
+        why = body.obstacles(np.array(start.joints_rad)[np.newaxis])[0]
+    else:
+        inside = cell.workspace.contains(start.T_base_flange.translation)
+        why = None if inside else "flange or tool would leave the workspace"
+    if why is not None:
+        raise InputError(
+            f"the arm stands where it may not go: {why}",
+            code="unsafe_start",
+            hint="drive it to a free place, or state a workspace and a floor that are true",
+        )
+    return start
 
 
 def _replayed(
@@ -422,24 +355,21 @@ def _simulated(
         optics=optics,
         faults=wrong.faults,
         camera_error=wrong.camera_error,
-        hang_s=wrong.hang_s,
-        patience=configuration.patience,
     )
     made = simulated_cell(arm, options)
     cell = made.cell
-    workspace = cell.workspace if configuration.workspace_m is None else configuration.workspace()
-    cell = Cell(
-        cell.robot,
-        cell.source,
-        arm,
-        workspace,
-        cell.camera,
-        cell.target,
-        configuration.patience,
-        confirm,
-        solids,
+    around = None if cell.workspace is None else replace(cell.workspace, floor_m=configuration.floor_m)
+    workspace = around if configuration.workspace_m is None else configuration.workspace()
+    cell = replace(
+        cell,
+        workspace=workspace,
+        patience=configuration.patience.without_clock(),
+        confirm=confirm,
+        solids=solids,
+        speed_rad_s=configuration.speed_rad_s,
     )
-    return Prepared(configuration, cell, made.start, made.recording, made.truth, made.hidden_arm)
+    start = _safe(made.start, cell)
+    return Prepared(configuration, cell, start, made.recording, made.truth, made.hidden_arm)
 
 
 def _nobody(question: str) -> str:

@@ -28,10 +28,11 @@ class EndReason(StrEnum):
     NO_CANDIDATE = "no_candidate"
     NO_START = "no_start"
     TOO_MANY_FAILURES = "too_many_failures"
+    ROBOT_HANGS = "robot_hangs"
 
 
 # Ends without an answer.
-FAILED = (EndReason.NO_START, EndReason.TOO_MANY_FAILURES)
+FAILED = (EndReason.NO_START, EndReason.TOO_MANY_FAILURES, EndReason.ROBOT_HANGS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +49,16 @@ class Situation:
         Those of them to plan from: views that turned out wrong are left out.
     estimate
         What is believed; None after fewer than three views.
+    forgiven
+        How many of the attempts since the last view do not count any more: the session ended with them, and
+        was told to go on.
     """
 
     entries: tuple[Entry, ...]
     views: tuple[View, ...]
     measurements: Measurements
     estimate: Estimate | None
+    forgiven: int = 0
 
     @cached_property
     def missed(self) -> list[Entry]:
@@ -65,8 +70,18 @@ class Situation:
             missed.append(entry)
         return missed[::-1]
 
+    @property
+    def counted(self) -> list[Entry]:
+        """Return the attempts since the last view that count against going on."""
+        return self.missed[self.forgiven :]
+
+    @property
+    def next_number(self) -> int:
+        """Return the number of the next view: all that are in the journal are counted, usable or not."""
+        return 1 + sum(1 for entry in self.entries if entry.view is not None)
+
     def joints(self, view: View) -> tuple[float, ...]:
-        """Return the joints of a view; where the robot does not tell them, those that it was sent to."""
+        """Return the joints of a view; where nobody tells them, some that reach the goal."""
         if view.joints_rad is not None:
             return view.joints_rad
         entry = next(e for e in self.entries if e.view is not None and e.view.name == view.name)

@@ -16,17 +16,19 @@ from handeye.cameras.folder import WatchedFolder
 from handeye.cameras.protocol import Grey, ImageSource
 from handeye.cameras.replay import ReplayCamera
 from handeye.datasets.images import read_image
-from handeye.errors import DeviceError, InputError
+from handeye.errors import DeviceError, InputError, printable
 from handeye.importing import Opened, open_folder
 from handeye.notations import notation_of, unit_of
+from handeye.robots import Arm
 from handeye.robots.manual import ManualRobot
 from handeye.robots.protocol import Robot
 from handeye.robots.replay import ReplayRobot
+from handeye.session.calls import MAX_MESSAGE
 from handeye.types import View
 
-REPLAY = "replay"
+REPLAY, MANUAL = "replay", "manual"
 ROBOT_GROUP, CAMERA_GROUP = "handeye.robots", "handeye.cameras"
-ROBOTS = ("simulated", "manual", REPLAY)
+ROBOTS = ("simulated", MANUAL, REPLAY)
 CAMERAS = ("simulated", "folder", "opencv", REPLAY)
 
 
@@ -38,8 +40,12 @@ class Person:
     tell: Callable[[str], None]
 
 
-def open_robot(spec: str, person: Person) -> Robot:
+def open_robot(
+    spec: str, person: Person, arm: Arm | None = None, *, joints_told: bool | None = None
+) -> Robot:
     """Return the robot of a specification: `manual:kuka`, `manual:ur/mm`, `replay:FOLDER` or `NAME:ADDRESS`.
+
+    `arm` and `joints_told` are for a person who moves the arm, see `ManualRobot`.
 
     Raises
     ------
@@ -49,17 +55,25 @@ def open_robot(spec: str, person: Person) -> Robot:
         The driver cannot reach its robot.
     """
     name, _, address = spec.partition(":")
-    if name == "manual":
-        notation, _, unit = address.partition("/")
-        written = notation_of(notation or "ur")
-        return ManualRobot(person.ask, person.tell, written, unit_of(unit) if unit else None)
+    if name == MANUAL:
+        name, _, unit = address.partition("/")
+        return ManualRobot(
+            person.ask,
+            person.tell,
+            notation_of(name or "ur"),
+            unit=unit_of(unit) if unit else None,
+            arm=arm,
+            joints_told=joints_told,
+        )
     if name == REPLAY:
         return ReplayRobot(open_folder(address).recording.views)
     return _announced(ROBOT_GROUP, name, address, ROBOTS, Robot)
 
 
-def open_camera(spec: str, robot: Robot, person: Person) -> ImageSource:
+def open_camera(spec: str, robot: Robot, person: Person, patience_s: float = 600.0) -> ImageSource:
     """Return the camera of a specification: `folder:PATH`, `opencv:0`, `replay:FOLDER` or `NAME:ADDRESS`.
+
+    `patience_s` is how long a picture in a folder is waited for.
 
     Raises
     ------
@@ -70,7 +84,8 @@ def open_camera(spec: str, robot: Robot, person: Person) -> ImageSource:
     """
     name, _, address = spec.partition(":")
     if name == "folder":
-        return WatchedFolder(Path(address), read_image, announce=person.tell)
+        # It gives up a little earlier than its caller, who does not know what was waited for.
+        return WatchedFolder(Path(address), read_image, patience_s=0.95 * patience_s, announce=person.tell)
     if name == "opencv":
         return Capture(int(address) if address.isdecimal() else address)
     if name == REPLAY:
@@ -99,8 +114,11 @@ def _announced(group: str, name: str, address: str, own: tuple[str, ...], kind: 
         )
     try:
         driver = found[name].load()(address)
-    except Exception as error:
-        raise DeviceError(f"driver {name}: {type(error).__name__}: {error}", code="driver_failed") from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        message = printable(f"{type(error).__name__}: {str(error)[:MAX_MESSAGE]}", MAX_MESSAGE)
+        raise DeviceError(f"driver {name}: {message}", code="driver_failed") from error
     if not isinstance(driver, kind):
         raise InputError(f"driver {name}: {type(driver).__name__} lacks a method of {kind.__name__}")
     return driver

@@ -15,6 +15,8 @@ class Failure(StrEnum):
     NOT_CONFIRMED = "not_confirmed"
     MOTION_REFUSED = "motion_refused"
     ROBOT_FAILED = "robot_failed"
+    BAD_READING = "bad_reading"
+    NOT_MOVED = "not_moved"
     ELSEWHERE = "elsewhere"
     CAMERA_FAILED = "camera_failed"
     CAMERA_TIMEOUT = "camera_timeout"
@@ -29,6 +31,8 @@ class Failure(StrEnum):
 TRANSIENT = frozenset(
     {
         Failure.ROBOT_FAILED,
+        Failure.BAD_READING,
+        Failure.NOT_MOVED,
         Failure.CAMERA_FAILED,
         Failure.CAMERA_TIMEOUT,
         Failure.BAD_IMAGE,
@@ -52,6 +56,7 @@ class _EntryDocument(Document):
     decision: dict[str, Any] = {}  # noqa: RUF012 - msgspec copies an empty default
     timings_s: dict[str, float] = {}  # noqa: RUF012
     image_digest: str | None = None
+    standing_rad: list[float] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,8 @@ class Entry:
         Seconds that deciding, moving, exposing and detecting took.
     image_digest
         Of the image, to notice one that comes twice.
+    standing_rad
+        Joints where the robot said that it stood afterwards; None if it did not say.
     """
 
     number: int
@@ -94,6 +101,7 @@ class Entry:
     decision: Mapping[str, Any] = field(default_factory=dict[str, Any])
     timings_s: Mapping[str, float] = field(default_factory=dict[str, float])
     image_digest: str | None = None
+    standing_rad: tuple[float, ...] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; `from_dict` reads them back."""
@@ -110,6 +118,7 @@ class Entry:
             decision=dict(self.decision),
             timings_s=dict(self.timings_s),
             image_digest=self.image_digest,
+            standing_rad=None if self.standing_rad is None else list(self.standing_rad),
         )
 
     @classmethod
@@ -135,4 +144,5 @@ class Entry:
             document.decision,
             document.timings_s,
             document.image_digest,
+            None if document.standing_rad is None else tuple(document.standing_rad),
         )

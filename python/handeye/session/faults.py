@@ -1,6 +1,5 @@
 """Drivers that fail on purpose, to see what becomes of a session."""
 
-import time
 import zlib
 from dataclasses import dataclass
 
@@ -27,7 +26,8 @@ class FaultRates:
     not_found, blurred, overexposed
         Of the picture.
     camera_hangs, camera_fails, garbage, stale
-        The camera does not answer, raises, returns noise, or returns the last picture again.
+        The camera does not answer in time (said at once: simulated cells have no clock), raises, returns
+        noise, or returns the last picture again.
 
     Raises
     ------
@@ -82,26 +82,19 @@ class FaultyRobot:
 
 
 class FaultyCamera:
-    """A camera that fails at random, always alike for the same seed and label.
+    """A camera that fails at random, always alike for the same seed and label."""
 
-    Parameters
-    ----------
-    hang_s
-        How long it does not answer where it hangs.
-    """
-
-    def __init__(self, source: ImageSource, rates: FaultRates, seed: int, hang_s: float = 60.0) -> None:
+    def __init__(self, source: ImageSource, rates: FaultRates, seed: int) -> None:
         self._source = source
         self._rates = rates
         self._seed = seed
-        self._hang_s = hang_s
         self._last: Frame | None = None
 
     def grab(self, label: str) -> Frame:
         """Take a picture, or something like it."""
         rates, random = self._rates, _chance(self._seed, 6, label)
         if random.uniform() < rates.camera_hangs:
-            time.sleep(self._hang_s)
+            raise DeviceError(f"{label}: no answer in time", code="timeout")
         if random.uniform() < rates.camera_fails:
             raise RuntimeError("grab failed (-1)")
         if random.uniform() < rates.stale and self._last is not None:

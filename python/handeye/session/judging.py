@@ -1,10 +1,13 @@
 """Whether what was seen fits what is believed: labels of symmetric boards, and views that cannot be true."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from handeye import _core
 from handeye.detection import Detection, Prediction, relabeled
 from handeye.errors import HandeyeError
+from handeye.robots.replay import is_near
 from handeye.solving import Estimate, view_pose
 from handeye.types import Camera, Pose, Target, View
 
@@ -17,6 +20,9 @@ SIGMAS = 6.0
 FEWEST_WITNESSES = 4
 # The arm's own errors are not all known: a prediction is never taken to be better than this.
 LEAST_MARGIN_PX = 8.0
+# Points that all moved less than this did not move, though the arm moved more than this: metres, radians.
+UNCHANGED_PX = 0.5
+ELSEWHERE = (0.005, np.deg2rad(1.0))
 
 
 def labeled(camera: Camera, target: Target, detection: Detection, T_base: Pose, expected: Pose) -> Detection:
@@ -61,6 +67,18 @@ def objection(
     choices = [pose.T_camera_target] + ([] if pose.mirrored is None else [pose.mirrored[0]])
     complaints = [_surprise(estimate, A, expected, seen) for seen in choices]
     return None if None in complaints else complaints[0]
+
+
+def unchanged(view: View, others: Sequence[View]) -> bool:
+    """Tell whether a view shows what another showed from elsewhere: a picture that came again."""
+    for other in others:
+        if is_near(view.T_base_flange, other.T_base_flange, *ELSEWHERE):
+            continue
+        if np.array_equal(view.point_ids, other.point_ids) and (
+            np.abs(view.pixels - other.pixels).max() < UNCHANGED_PX
+        ):
+            return True
+    return False
 
 
 def foreseen(camera: Camera, target: Target, estimate: Estimate | None, T_base: Pose) -> Prediction | None:
@@ -111,7 +129,7 @@ def _deviations(estimate: Estimate, A: Pose, expected: Pose) -> tuple[float, flo
     lever[:3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
     jacobian = lever @ jacobian
     covariance = jacobian @ estimate.covariance[:12, :12] @ jacobian.T
-    robot = max(h.robot_translation_m for h in estimate.hypotheses)
+    robot = estimate.noise.robot_translation_m
     sigma_m = float(np.sqrt(np.trace(covariance[:3, :3]) + 3 * robot**2))
     sigma_rad = float(np.sqrt(np.trace(covariance[3:, 3:])))
     return sigma_m, sigma_rad

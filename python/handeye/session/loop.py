@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 from handeye.errors import InputError
 from handeye.session.attempt import Cell
-from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Situation, Step
+from handeye.session.contract import check_at_rest
+from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step
 from handeye.session.entry import Entry
 from handeye.session.request import Reach, reach
 from handeye.session.store import SessionStore
@@ -74,15 +75,19 @@ class Session:
         self._kinematics = chooser.kinematics if known else None
         self._estimator: Estimator = make_estimator(wish.model, self._kinematics)
         self._measurements = Measurements.of(store.recording.mounting, cell.camera, cell.target)
+        self._forgiven_up_to: int | None = None
 
     def run(self) -> End:
         """Run until the end; an interruption stops the arm first and leaves the session whole.
 
         Raises
         ------
+        DeviceError
+            The robot does not keep the contract where it stands; nothing was sent to it.
         OutputError
             The disk does not take an attempt, also not when asked again.
         """
+        check_at_rest(self._cell)
         try:
             while True:
                 step = self.next()
@@ -96,16 +101,46 @@ class Session:
     def next(self) -> Step | End:
         """Decide what to do next, without doing it."""
         began = time.monotonic()
-        entries = self._store.entries
-        views = [entry.view for entry in entries if entry.view is not None]
+        if self._cell.robot_calls.pending:
+            return self._end(
+                EndReason.ROBOT_HANGS,
+                "the last command to the robot has not come back, and nothing more is sent to it; "
+                "the arm may still move",
+            )
+        views = self._usable()
         measurements = _without_mistakes(self._with(views))
         if len(measurements) < len(views) and len(views) >= self._wish.most_views:
             return self._end(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
         estimate = self._estimator(measurements) if len(measurements) >= START_VIEWS else None
-        answer = self._chooser.choose(Situation(entries, tuple(views), measurements, estimate))
+        answer = self._choose(Situation(self._store.entries, tuple(views), measurements, estimate))
         if isinstance(answer, Step):
             return replace(answer, seconds=time.monotonic() - began)
         return self._end(answer.reason, answer.sentence)
+
+    def _choose(self, situation: Situation) -> Step | Halt:
+        """Choose; a session that had ended in failures when it was opened gets as many attempts again."""
+        if self._forgiven_up_to is None:
+            self._forgiven_up_to = 0
+            if situation.missed:
+                first = self._chooser.choose(situation)
+                if not isinstance(first, Halt) or first.reason not in FAILED:
+                    return first
+                self._forgiven_up_to = len(situation.entries)
+        forgiven = sum(1 for entry in situation.missed if entry.number <= self._forgiven_up_to)
+        return self._chooser.choose(replace(situation, forgiven=forgiven))
+
+    def _usable(self) -> list[View]:
+        """Return the views with joints that the arm can have; older sessions may hold others."""
+        arm = self._cell.arm
+        views = [entry.view for entry in self._store.entries if entry.view is not None]
+        if arm is None:
+            return views
+        needed = self._kinematics is not None
+        return [
+            view
+            for view in views
+            if (len(view.joints_rad) == len(arm) if view.joints_rad is not None else not needed)
+        ]
 
     def take(self, step: Step) -> Entry:
         """Do a step, and write down what it brought.
@@ -128,7 +163,10 @@ class Session:
 
     def _end(self, reason: EndReason, sentence: str) -> End:
         entries = self._store.entries
-        views = [entry.view for entry in entries if entry.view is not None]
+        views = self._usable()
+        left_out = [e.view.name for e in entries if e.view is not None and e.view not in views]
+        if left_out:
+            sentence += f"; without {', '.join(left_out)}, whose joint positions are not those of the arm"
         calibration, radii = None, None
         measurements = self._with(views)
         if len(measurements) >= START_VIEWS:

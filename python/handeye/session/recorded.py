@@ -18,7 +18,8 @@ from handeye.session.deciding import (
     halt_of,
 )
 from handeye.session.wish import Wish
-from handeye.solving import Estimate, Sight
+from handeye.planning.prediction import Sight
+from handeye.solving import Estimate
 from handeye.types import View
 from handeye.types.arrays import FloatArray
 

@@ -54,8 +54,6 @@ class SimulationOptions:
     optics: Optics = field(default_factory=Optics)
     faults: FaultRates | None = None
     camera_error: float = 1.0
-    hang_s: float = 60.0
-    patience: Patience = field(default_factory=Patience)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +97,9 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
     )
     driver: Robot = robot
     if options.faults is not None:
-        source = FaultyCamera(source, options.faults, options.seed, options.hang_s)
+        source = FaultyCamera(source, options.faults, options.seed)
         driver = FaultyRobot(robot, options.faults, options.seed)
-    cell = Cell(driver, source, arm, workspace, known, options.target, options.patience)
+    cell = Cell(driver, source, arm, workspace, known, options.target, Patience().without_clock())
     recording = Recording(
         f"simulated {arm.name} {options.seed}",
         options.mounting,
@@ -114,15 +112,9 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
     return SimulatedCell(cell, Start(T_base_flange, joints), recording, truth, robot)
 
 
-def reach_m(arm: Arm) -> float:
-    """Return a length that the arm reaches at most: its links one after the other."""
-    offsets = [joint.placement.translation for joint in arm.joints[1:]] + [arm.T_last_flange.translation]
-    return float(sum(np.linalg.norm(offset) for offset in offsets))
-
-
 def surrounding(arm: Arm) -> Workspace:
     """Return the box in front of, beside and above an arm that stands on a table."""
-    reach = reach_m(arm) + 0.2
+    reach = arm.reach_m + 0.2
     return Workspace(np.array([-reach, -reach, 0.02]), np.array([reach, reach, reach + 0.3]))
 
 
@@ -134,7 +126,7 @@ def looking_down(arm: Arm, workspace: Workspace) -> tuple[Pose, tuple[float, ...
     SolveError
         There is none.
     """
-    reach = reach_m(arm)
+    reach = arm.reach_m
     body = Body(arm, workspace)
     low, high = np.clip(arm.limits.T, -2 * np.pi, 2 * np.pi)
     for forward, up in ((0.45, 0.6), (0.4, 0.5), (0.5, 0.45), (0.35, 0.4), (0.3, 0.6)):

@@ -35,14 +35,24 @@ ROOM_SHARE, SHRINK = 0.7, 0.6
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where the arm stood when the session began."""
+    """Where the arm stood when the session began.
+
+    Where a person moves the arm and does not tell its joints, these are some that reach the pose, and
+    `posture_known` says that it need not be these.
+    """
 
     T_base_flange: Pose
     joints_rad: tuple[float, ...]
+    posture_known: bool = True
 
 
 def starting_goal(
-    start: Start, views: Sequence[View], failures: int, camera: Camera, body: Body
+    start: Start,
+    views: Sequence[View],
+    failures: int,
+    camera: Camera,
+    body: Body,
+    standing_rad: Sequence[float] | None,
 ) -> tuple[Pose, FloatArray] | None:
     """Return the next safe pose and its joints, None if there is none.
 
@@ -53,7 +63,9 @@ def starting_goal(
     failures
         Attempts at the next view that failed since the last view.
     body
-        The arm, of which it is not known yet what is mounted on it.
+        The arm, as far as it is known with what is mounted on it.
+    standing_rad
+        (n,) joints where the arm stands now, from where the way must be free; None if nobody tells.
     """
     if not views:
         return start.T_base_flange, np.array(start.joints_rad)
@@ -63,7 +75,9 @@ def starting_goal(
     for trial in range(failures, failures + 6):
         pose = start.T_base_flange @ Pose.exp(_twist(views, trial, camera))
         joints, reached = arm.inverse_all(pose.matrix[np.newaxis], np.array(start.joints_rad), attempts=1)
-        if reached[0] and body.obstacle_on_path(start.joints_rad, joints[0]) is None:
+        if not reached[0]:
+            continue
+        if standing_rad is None or body.obstacle_on_path(standing_rad, joints[0]) is None:
             return Pose(arm.forward(joints[0])), joints[0]
     return None
 

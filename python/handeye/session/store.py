@@ -7,50 +7,60 @@
     journal.jsonl                       one line per attempt, good or bad
 
 The journal is the truth. A line is appended and brought to the disk before the arm moves again; the recording
-is brought up to date from it, also on the next opening if the process died in between. A last line that was
-cut off is as if it had never been written. So nothing is lost and nothing is doubled, whenever the process
-ends.
+is brought up to date from it, also on the next opening if the process died in between, or a file of it was
+lost. What the recording holds and the journal lacks is never deleted: such a session is refused.
 """
 
-import contextlib
-import json
 import os
+import stat
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
-from handeye.datasets import read_recording, write_recording
-from handeye.datasets.reading import MIB, existing_folder, is_file, reason
-from handeye.datasets.writing import new_folder, replace_file, write_file
+from handeye.datasets import write_recording
+from handeye.datasets.reading import existing_folder, is_file, reason
+from handeye.datasets.recording_format import ViewsApart, read_views_apart, write_empty_recording
+from handeye.datasets.writing import new_folder, remove_partials, replace_file, write_file
 from handeye.errors import InputError, OutputError
 from handeye.session.entry import Entry
-from handeye.types import Recording, Truth
+from handeye.session.journal import (
+    JOURNAL_FILE,
+    SETTINGS_FILE,
+    Journal,
+    Settings,
+    read_journal,
+    read_settings,
+)
+from handeye.types import Recording, Truth, View
 
-SETTINGS_FILE, JOURNAL_FILE, RECORDING_FILE = "session.json", "journal.jsonl", "recording.toml"
-FORMAT, VERSION = "handeye-session", 1
-MAX_SETTINGS_BYTES, MAX_JOURNAL_BYTES = 4 * MIB, 256 * MIB
+RECORDING_FILE = "recording.toml"
 
 
 class SessionStore:
     """The folder of one session, open for one process at a time.
 
-    Use `create` or `open_session`; close it at the end.
+    Use `create_session` or `open_session`; close it at the end.
     """
 
     def __init__(
-        self, folder: Path, settings: Mapping[str, Any], recording: Recording, lock: IO[bytes] | None
+        self,
+        folder: Path,
+        settings: Mapping[str, Any],
+        recording: Recording,
+        journal: Journal,
+        lock: IO[bytes],
     ) -> None:
         self.folder = folder
         self.settings = settings
         self._recording = recording
+        self._journal = journal
         self._lock = lock
-        self._entries: list[Entry] = []
-        self._size = 0
 
     @property
     def entries(self) -> tuple[Entry, ...]:
         """All attempts so far, in order."""
-        return tuple(self._entries)
+        return self._journal.entries
 
     @property
     def recording(self) -> Recording:
@@ -82,28 +92,9 @@ class SessionStore:
             The system refuses to write. The journal is then as it was, or the entry is kept and only the
             recording lags behind, to be brought up to date with the next view or the next opening.
         """
-        line = json.dumps(entry.to_dict(), separators=(",", ":"), allow_nan=False).encode() + b"\n"
-        path = self.folder / JOURNAL_FILE
-        try:
-            with path.open("r+b") as file:
-                file.seek(self._size)
-                try:
-                    file.write(line)
-                    file.flush()
-                    os.fsync(file.fileno())
-                except BaseException:
-                    with contextlib.suppress(OSError):
-                        file.truncate(self._size)
-                    raise
-        except OSError as error:
-            raise OutputError(
-                f"{path}: cannot be written: {reason(error)}",
-                hint="make room, then go on with --resume; nothing is lost",
-            ) from error
-        self._size += len(line)
-        self._entries.append(entry)
+        self._journal.append(entry)
         if entry.view is not None:
-            self._bring_up_to_date()
+            self.bring_up_to_date()
 
     def reveal(self, truth: Truth) -> None:
         """Write what is true into the recording, once a simulated session has ended.
@@ -113,47 +104,22 @@ class SessionStore:
         OutputError
             The system refuses to write.
         """
-        recording = self._recording
-        self._recording = Recording(
-            recording.name,
-            recording.mounting,
-            recording.camera,
-            recording.target,
-            recording.views,
-            truth,
-            recording.source,
-        )
+        self._recording = replace(self._recording, truth=truth)
         write_recording(self._recording, self.folder, replace=True)
 
     def close(self) -> None:
         """Let another process open the session."""
-        if self._lock is not None:
-            self._lock.close()
-            self._lock = None
+        self._lock.close()
 
-    def load(self) -> None:
-        """Read the journal and bring the recording up to date with it.
+    def bring_up_to_date(self) -> None:
+        """Write the recording that follows from the journal.
 
         Raises
         ------
-        InputError
-            A line in the middle that cannot be read.
         OutputError
-            The recording lags behind and cannot be written.
+            The system refuses to write.
         """
-        path = self.folder / JOURNAL_FILE
-        self._entries, self._size = read_journal(path)
-        if path.stat().st_size > self._size:
-            with path.open("r+b") as file:
-                file.truncate(self._size)
-                os.fsync(file.fileno())
-        names = [entry.view.name for entry in self._entries if entry.view is not None]
-        if names != [view.name for view in self._recording.views]:
-            self._bring_up_to_date()
-
-    def _bring_up_to_date(self) -> None:
-        views = [entry.view for entry in self._entries if entry.view is not None]
-        self._recording = self._recording.with_views(views)
+        self._recording = self._recording.with_views(_views(self._journal))
         write_recording(self._recording, self.folder, replace=True)
 
 
@@ -165,10 +131,11 @@ def create_session(folder: Path, recording: Recording, settings: Mapping[str, An
     OutputError
         The folder is not empty, or the system refuses to write.
     """
-    document = {"format": FORMAT, "version": VERSION, "settings": settings}
+    empty = recording.with_views(())
+    asked = Settings(settings, replace(empty, truth=None).to_dict()).to_bytes()
     with new_folder(folder) as partial:
-        write_recording(recording.with_views(()), partial)
-        write_file(partial / SETTINGS_FILE, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+        write_recording(empty, partial)
+        write_file(partial / SETTINGS_FILE, asked)
         write_file(partial / JOURNAL_FILE, b"")
     return open_session(folder)
 
@@ -179,28 +146,25 @@ def open_session(folder: Path) -> SessionStore:
     Raises
     ------
     InputError
-        No session, one of a newer version, a damaged file, or another process works on it.
+        No session, one of a newer version, a file that was damaged or edited, or another process works on it.
     OutputError
         The recording lags behind the journal and cannot be written.
     """
     root = existing_folder(folder)
     settings = read_settings(root)
-    recording = read_recording(root).recording
-    if recording.truth is not None:
-        recording = Recording(
-            recording.name,
-            recording.mounting,
-            recording.camera,
-            recording.target,
-            recording.views,
-            None,
-            recording.source,
-        )
-    store = SessionStore(root, settings, recording, _locked(root / JOURNAL_FILE))
+    lock = _locked(root / JOURNAL_FILE)
     try:
-        store.load()
+        # Everything is compared before anything is written.
+        journal = read_journal(root, settings)
+        recording, current = _recording_of(root, settings, journal)
+        journal.mend()
+        for part in (root, root / "corners", root / "images"):
+            remove_partials(part)
+        store = SessionStore(root, settings.asked, recording, journal, lock)
+        if not current:
+            store.bring_up_to_date()
     except BaseException:
-        store.close()
+        lock.close()
         raise
     return store
 
@@ -210,75 +174,92 @@ def is_session(folder: Path) -> bool:
     return is_file(folder / SETTINGS_FILE) and is_file(folder / JOURNAL_FILE)
 
 
-def read_settings(folder: Path) -> Mapping[str, Any]:
-    """Return what a session was asked for.
+def _views(journal: Journal) -> list[View]:
+    return [entry.view for entry in journal.entries if entry.view is not None]
+
+
+def _recording_of(root: Path, settings: Settings, journal: Journal) -> tuple[Recording, bool]:
+    """Return the recording that follows from the journal, and whether it is what lies on the disk.
 
     Raises
     ------
     InputError
-        No session, or a file that is not what it should be.
+        The recording holds what the journal lacks, or was edited.
     """
-    from handeye.datasets.reading import read_text  # noqa: PLC0415
+    views = _views(journal)
+    base = None if settings.recording is None else Recording.from_dict(settings.recording)
+    path = root / RECORDING_FILE
+    if base is not None and not path.exists() and not path.is_symlink():
+        write_empty_recording(base, root)
+        return base.with_views(views), False
+    found = read_views_apart(root)
+    if base is None:
+        base = found.recording
+    _check_same(path, base, found, views)
+    recording = base.with_views(views)
+    current = list(found.views) == [view.name for view in views] and not any(
+        isinstance(view, InputError) for view in found.views.values()
+    )
+    return recording, current
 
-    path = folder / SETTINGS_FILE
-    try:
-        document = json.loads(read_text(path, MAX_SETTINGS_BYTES))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not JSON: {error}", code="not_json") from error
-    if not isinstance(document, dict) or document.get("format") != FORMAT:  # pyright: ignore[reportUnknownMemberType]
-        raise InputError(f"{path}: no session of ours", code="unknown_format")
-    version = document.get("version")  # pyright: ignore[reportUnknownMemberType, reportUnknownVariableType]
-    if version != VERSION:
+
+def _check_same(path: Path, base: Recording, found: ViewsApart, views: list[View]) -> None:
+    """Refuse a recording that holds what the journal lacks.
+
+    Raises
+    ------
+    InputError
+        It does.
+    """
+    known = {view.name: view for view in views}
+    more = [name for name in found.views if name not in known]
+    if more:
         raise InputError(
-            f"{path}: version {str(version)[:60]}, this program reads {VERSION}",  # pyright: ignore[reportUnknownArgumentType]
-            code="newer_version",
-            hint="update handeye",
+            f"{path}: holds {', '.join(more[:10])}, which no attempt in the journal took: it was cut "
+            f"after {len(views)} views",
+            code="journal_cut",
+            hint=f"restore {JOURNAL_FILE} from a copy; handeye solve uses the recording as it is",
         )
-    settings = document.get("settings")  # pyright: ignore[reportUnknownMemberType, reportUnknownVariableType]
-    if not isinstance(settings, dict):
-        raise InputError(f"{path}: no settings", code="invalid_field")
-    return settings  # pyright: ignore[reportUnknownVariableType]
-
-
-def read_journal(path: Path) -> tuple[list[Entry], int]:
-    """Return the attempts of a journal and the number of bytes they take; a line cut off at the end is left.
-
-    Raises
-    ------
-    InputError
-        No such file, or a line that was edited.
-    """
-    from handeye.datasets.reading import read_bytes  # noqa: PLC0415
-
-    content = read_bytes(path, MAX_JOURNAL_BYTES)
-    whole = content[: content.rfind(b"\n") + 1]
-    entries: list[Entry] = []
-    for number, line in enumerate(whole.splitlines(), start=1):
-        try:
-            data = json.loads(line)
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"{path}: line {number}: not JSON: {error}", code="not_json") from error
-        entry = Entry.from_dict(data, f"{path}: line {number}")
-        if entry.number != number:
+    if found.recording.to_dict() != base.to_dict():
+        raise InputError(
+            f"{path}: name, source, mounting, camera or target are not those that the session began with",
+            code="edited",
+            hint="undo the change, or begin a new session",
+        )
+    for name, view in found.views.items():
+        if isinstance(view, InputError):
+            if view.code != "missing_file":
+                raise view
+        elif not _same(view, known[name]):
             raise InputError(
-                f"{path}: line {number}: attempt {entry.number}, expected {number}",
+                f"{path}: view {name} is not as in the journal: its row or its corners were edited",
                 code="edited",
-                hint="restore the journal",
+                hint="undo it, or delete the file of its corners: it is written again from the journal",
             )
-        entries.append(entry)
-    return entries, len(whole)
 
 
-def _locked(path: Path) -> IO[bytes] | None:
+def _same(view: View, known: View) -> bool:
+    one, other = view.to_dict(), known.to_dict()
+    if one.get("image") is None:  # lost, and not kept in the journal
+        other.pop("image", None)
+    return one == other
+
+
+def _locked(path: Path) -> IO[bytes]:
     """Keep other processes out until the file is closed, where the system can."""
+    try:
+        # Opening a pipe must not wait for a writer.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
+        file = os.fdopen(descriptor, "rb")
+    except OSError as error:
+        raise InputError(f"{path}: {reason(error)}", code="missing_file") from error
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        file.close()
+        raise InputError(f"{path}: not a regular file", code="unreadable")
     try:
         import fcntl  # noqa: PLC0415 - there is none on Windows
     except ImportError:
-        return None
-    try:
-        file = path.open("rb")
-    except OSError as error:
-        raise InputError(f"{path}: {reason(error)}", code="missing_file") from error
+        return file
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

@@ -4,15 +4,12 @@ import time
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from handeye.detection import Detection
-from handeye.errors import HandeyeError, OutputError
-from handeye.robots.protocol import Goal, Reading
+from handeye.errors import HandeyeError, OutputError, printable
 from handeye.session.attempt import Cell, Missed, Seen, attempt, encoded
 from handeye.session.deciding import Step
 from handeye.session.entry import Entry, Failure
-from handeye.session.judging import foreseen, labeled, objection
+from handeye.session.judging import foreseen, labeled, objection, unchanged
 from handeye.session.store import SessionStore
 from handeye.solving import Estimate, view_pose
 from handeye.types import View
@@ -38,7 +35,7 @@ class Taker:
         timings = {"decide": step.seconds}
         digests = frozenset(e.image_digest for e in self._store.entries if e.image_digest is not None)
         foresee = partial(foreseen, self._cell.camera, self._cell.target, step.estimate)
-        outcome = attempt(self._cell, step.goal, digests, timings, foresee)
+        outcome = attempt(self._cell, step.goal, digests, timings, foresee, step.estimate)
         if isinstance(outcome, Seen):
             outcome = self._judged(step, outcome)
         entry = Entry(
@@ -57,12 +54,16 @@ class Taker:
                 entry,
                 moved=outcome.moved,
                 failure=outcome.failure,
-                detail=outcome.detail[:500],
+                detail=printable(outcome.detail, 500),
                 image_digest=outcome.digest,
+                standing_rad=None if outcome.standing is None else outcome.standing.joints_rad,
             )
         else:
             view, seen = outcome
-            entry = replace(entry, view=view, detail=seen.note, image_digest=seen.digest)
+            standing = seen.reading.joints_rad
+            entry = replace(
+                entry, view=view, detail=seen.note, image_digest=seen.digest, standing_rad=standing
+            )
             image = None if seen.image is None else encoded(seen.image)
         self._write(entry, image)
         return entry
@@ -72,7 +73,6 @@ class Taker:
         name = step.goal.label.rpartition(".")[0]
         detection = seen.detection if seen.labels_known else self._labels(seen, estimate)
         image = None if seen.image is None else f"images/{name}.png"
-        joints = seen.reading.joints_rad
         try:
             view = View(
                 name,
@@ -81,14 +81,19 @@ class Taker:
                 detection.pixels,
                 image,
                 seen.timestamp_s,
-                joints if joints is not None else self._joints_of(seen.reading, step.goal),
+                seen.reading.joints_rad,
             )
             self._store.recording.with_views((*self._store.recording.views, view))
         except HandeyeError as error:
-            return Missed(Failure.BAD_IMAGE, error.message, moved=True, digest=seen.digest)
+            return Missed(
+                Failure.BAD_IMAGE, error.message, moved=True, digest=seen.digest, standing=seen.reading
+            )
+        if unchanged(view, self._store.recording.views):
+            why = "the target did not move in the picture, though the arm did"
+            return Missed(Failure.STALE_IMAGE, why, moved=True, digest=seen.digest, standing=seen.reading)
         why = objection(cell.camera, cell.target, view, estimate, len(self._store.recording.views))
         if why is not None:
-            return Missed(Failure.INCONSISTENT, why, moved=True, digest=seen.digest)
+            return Missed(Failure.INCONSISTENT, why, moved=True, digest=seen.digest, standing=seen.reading)
         return view, seen
 
     def _labels(self, seen: Seen, estimate: Estimate | None) -> Detection:
@@ -103,15 +108,6 @@ class Taker:
         else:
             return seen.detection
         return labeled(cell.camera, cell.target, seen.detection, seen.reading.T_base_flange, expected)
-
-    def _joints_of(self, reading: Reading, goal: Goal) -> tuple[float, ...] | None:
-        """Return joints for a pose that came without, None where the description does not reach it."""
-        arm = self._cell.arm
-        if arm is None:
-            return None
-        start = np.array(goal.joints_rad) if goal.joints_rad is not None else None
-        found, reached = arm.inverse_all(reading.T_base_flange.matrix[np.newaxis], start, attempts=1)
-        return tuple(found[0].tolist()) if reached[0] else None
 
     def _write(self, entry: Entry, image: bytes | None) -> None:
         """Write an attempt down; where the disk refuses, wait and ask again before giving up."""

@@ -53,6 +53,8 @@ class Wish:
 
     def __post_init__(self) -> None:
         self.rules()  # checks what they check
+        if self.seed < 0:
+            raise InputError(f"seed {self.seed}, expected zero or more", code="out_of_range")
         if not 0 < self.speed_rad_s < float("inf") or min(self.failures_in_a_row, self.tries_at_a_place) < 1:
             raise InputError("a speed above zero and at least one attempt are needed", code="out_of_range")
 

@@ -9,7 +9,7 @@ from handeye.solving.calibrate import (
     solve,
     to_calibration,
 )
-from handeye.solving.estimate import Estimate, Estimator, Sight
+from handeye.solving.estimate import Estimate, Estimator
 from handeye.solving.measurements import Measurements, ViewPose, view_pose
 from handeye.solving.paper import paper_estimate
 
@@ -19,7 +19,6 @@ __all__ = [
     "Estimate",
     "Estimator",
     "Measurements",
-    "Sight",
     "ViewPose",
     "calibrate",
     "calibrate_examined",

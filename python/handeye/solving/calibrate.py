@@ -6,7 +6,6 @@ import numpy as np
 
 from handeye.errors import DegenerateError
 from handeye.solving.auto import AutoEstimator, AutoOptions
-from handeye.solving.blame import blame
 from handeye.solving.estimate import Estimate, Estimator, regular_information
 from handeye.solving.initialize import check_views
 from handeye.solving.measurements import Measurements
@@ -18,11 +17,13 @@ from handeye.types.kinematics import Kinematics
 from handeye.types.recording import Recording
 
 
-def make_estimator(model: ModelName, kinematics: Kinematics | None = None) -> Estimator:
+def make_estimator(
+    model: ModelName, kinematics: Kinematics | None = None, *, camera_fixed: bool = False
+) -> Estimator:
     """Return what estimates under a model's assumptions; the paper's model has no use for the arm."""
     if ModelName(model) is ModelName.PAPER:
         return paper_estimate
-    return AutoEstimator(AutoOptions(kinematics=kinematics))
+    return AutoEstimator(AutoOptions(kinematics=kinematics, camera_fixed=camera_fixed))
 
 
 def solve(
@@ -31,6 +32,7 @@ def solve(
     *,
     reduced: bool = False,
     kinematics: Kinematics | None = None,
+    camera_fixed: bool = False,
 ) -> Calibration:
     """Calibrate from all usable views of a recording.
 
@@ -48,6 +50,8 @@ def solve(
     kinematics
         The arm, if it is known: errors of its joints are then part of the model. Every view must have joint
         positions.
+    camera_fixed
+        Whether the camera is held as it is given; the paper's model always holds it.
 
     Raises
     ------
@@ -62,7 +66,9 @@ def solve(
         No minimum was found.
     """
     measurements = Measurements.of_recording(recording)
-    return calibrate(measurements, ModelName(model), reduced=reduced, kinematics=kinematics)
+    return calibrate(
+        measurements, ModelName(model), reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed
+    )
 
 
 def calibrate(
@@ -71,10 +77,13 @@ def calibrate(
     *,
     reduced: bool = False,
     kinematics: Kinematics | None = None,
+    camera_fixed: bool = False,
 ) -> Calibration:
     """Calibrate from measurements; see `solve`."""
     check_views(measurements)
-    return calibrate_examined(examine(measurements), model, reduced=reduced, kinematics=kinematics)
+    return calibrate_examined(
+        examine(measurements), model, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed
+    )
 
 
 def calibrate_examined(
@@ -83,17 +92,20 @@ def calibrate_examined(
     *,
     reduced: bool = False,
     kinematics: Kinematics | None = None,
+    camera_fixed: bool = False,
 ) -> Calibration:
     """Calibrate from measurements whose mistakes have been looked for; see `solve`."""
     measurements = examination.measurements
     check_views(measurements)
-    estimate = make_estimator(model, kinematics)(measurements)
+    estimate = make_estimator(model, kinematics, camera_fixed=camera_fixed)(measurements)
     if not reduced:
         require_determined(estimate)
     calibration = examination.told(to_calibration(measurements, estimate))
     if calibration.model is ModelName.PAPER or not estimate.determined:
         return calibration
-    return replace(calibration, diagnosis=(*calibration.diagnosis, blame(measurements, estimate)))
+    if estimate.attribution is None:
+        raise AssertionError  # the default model always has one
+    return replace(calibration, diagnosis=(*calibration.diagnosis, estimate.attribution))
 
 
 def require_determined(estimate: Estimate) -> None:

@@ -119,6 +119,11 @@ class Measurements:
         """Return the measurements as seen through a camera close to this one; poses stay as they are."""
         return replace(self, camera=camera)
 
+    def through(self, camera: Camera) -> "Measurements":
+        """Return the measurements as made through another camera: every pose found again."""
+        again = Measurements(self.mounting, camera, self.target, (), (), dict(self.rejected))
+        return again.with_views(self.views)
+
     def __len__(self) -> int:
         return len(self.views)
 
@@ -142,8 +147,8 @@ class Measurements:
                     f"view {view.name}: {len(view.joints_rad or ())} joint positions, "
                     f"the first view has {len(self.views[0].joints_rad or ())}",
                     code="no_joints",
-                    hint="the arm's kinematics need the joint positions of every view: record them, or leave "
-                    "the arm away",
+                    hint="the arm's kinematics need the joint positions of every view: record them, or solve "
+                    "without the arm",
                 )
         return np.array([view.joints_rad for view in self.views], dtype=float)
 

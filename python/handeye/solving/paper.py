@@ -4,11 +4,11 @@ import numpy as np
 
 from handeye import _core
 from handeye.errors import DegenerateError, HandeyeError, SolveError
-from handeye.solving.estimate import Estimate, Hypothesis
+from handeye.solving.estimate import Estimate
 from handeye.solving.initialize import Start, check_views, closed_form_start, pose_start
 from handeye.solving.measurements import Measurements
 from handeye.solving.observability import undetermined
-from handeye.types.calibration import ModelName, Noise, RobotSide
+from handeye.types.calibration import ModelName, Noise
 from handeye.types.pose import Pose
 
 # A prior for views that do not determine the answer yet: a camera within metres of the flange, any rotation.
@@ -68,7 +68,7 @@ def paper_estimate(measurements: Measurements, previous: Estimate | None = None)
         Y=Y,
         camera=measurements.camera,
         covariance=solution.covariance,
-        hypotheses=(Hypothesis(1.0, RobotSide.NONE, 0.0, 0.0, solution.information),),
+        information=solution.information,
         noise=noise,
         model=ModelName.PAPER,
         start=start,

@@ -4,12 +4,14 @@ from handeye.types.camera import LENSES, Camera
 from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
 from handeye.types.recording import Recording, Truth
-from handeye.types.target import AprilGrid, Charuco, Chessboard, CircleGrid, Target
+from handeye.types.target import AprilGrid, ArucoGrid, ArucoMarker, Charuco, Chessboard, CircleGrid, Target
 from handeye.types.view import View
 
 __all__ = [
     "LENSES",
     "AprilGrid",
+    "ArucoGrid",
+    "ArucoMarker",
     "Camera",
     "Charuco",
     "Chessboard",

@@ -40,6 +40,7 @@ class _CameraDocument(Document):
     width_px: int
     height_px: int
     covariance: list[list[float]] | None = None
+    from_views: bool | None = None
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -56,6 +57,9 @@ class Camera:
         Size of the image.
     covariance
         (n, n) covariance of the parameters, in their units; None if unknown.
+    from_views
+        Whether it was calibrated from the very pictures that it is used with. What these say of it is in the
+        covariance then, and is not counted again.
 
     Raises
     ------
@@ -69,6 +73,7 @@ class Camera:
     width_px: int
     height_px: int
     covariance: FloatArray | None
+    from_views: bool
 
     def __init__(
         self,
@@ -77,6 +82,8 @@ class Camera:
         width_px: int,
         height_px: int,
         covariance: ArrayLike | None = None,
+        *,
+        from_views: bool = False,
     ) -> None:
         names = LENSES.get(lens)
         if names is None:
@@ -98,6 +105,7 @@ class Camera:
         _set(self, "width_px", count(width_px, 1, MAX_IMAGE_SIDE_PX, "camera: width_px"))
         _set(self, "height_px", count(height_px, 1, MAX_IMAGE_SIDE_PX, "camera: height_px"))
         _set(self, "covariance", None if covariance is None else _covariance(covariance, len(names)))
+        _set(self, "from_views", from_views)
 
     @classmethod
     def from_opencv(
@@ -197,6 +205,7 @@ class Camera:
             width_px=self.width_px,
             height_px=self.height_px,
             covariance=None if self.covariance is None else self.covariance.tolist(),
+            from_views=self.from_views or None,
         )
 
     @classmethod
@@ -210,12 +219,21 @@ class Camera:
         """
         document = read_document(data, _CameraDocument, "camera")
         return cls(
-            document.lens, document.parameters, document.width_px, document.height_px, document.covariance
+            document.lens,
+            document.parameters,
+            document.width_px,
+            document.height_px,
+            document.covariance,
+            from_views=bool(document.from_views),
         )
+
+    def with_parameters(self, parameters: ArrayLike) -> "Camera":
+        """Return the same camera with other parameters (n,)."""
+        return Camera(self.lens, parameters, *self.size_px, self.covariance, from_views=self.from_views)
 
     def _key(self) -> tuple[object, ...]:
         covariance = None if self.covariance is None else tuple(self.covariance.ravel())
-        return self.lens, tuple(self.parameters), self.size_px, covariance
+        return self.lens, tuple(self.parameters), self.size_px, covariance, self.from_views
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Camera) and self._key() == other._key()

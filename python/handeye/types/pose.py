@@ -242,6 +242,27 @@ def _unrounded(matrix: FloatArray) -> FloatArray:
     return matrix
 
 
+def through_twist(points: FloatArray, in_point: FloatArray) -> FloatArray:
+    """Turn derivatives in points into derivatives in a twist that moves the points.
+
+    The twist `xi = [rho; phi]` acts on the left, `p <- exp(xi) p`, so that `dp = [I, -[p]x] xi`; of a row
+    `d` of derivatives in `p` it makes `[d, p x d]`.
+
+    Parameters
+    ----------
+    points
+        (N, 3) points, metres.
+    in_point
+        (N, m, 3) derivatives of m values in each point.
+
+    Returns
+    -------
+    FloatArray
+        (N, m, 6) derivatives in the twist: metres, radians.
+    """
+    return np.concatenate([in_point, np.cross(points[:, np.newaxis], in_point)], axis=2)
+
+
 def _is_rigid(matrix: FloatArray) -> bool:
     """Tell whether a matrix is a rigid transform up to rounding of float64."""
     rotation = matrix[:3, :3]

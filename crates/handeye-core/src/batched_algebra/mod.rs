@@ -1,6 +1,6 @@
 //! Linear algebra of many candidates or views side by side: one per lane of a vector.
 //!
-//! What lies in memory lies as structure of arrays: rows of one value per candidate.
+//! Memory holds structures of arrays: rows with one value per candidate.
 
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 

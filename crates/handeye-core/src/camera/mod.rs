@@ -11,9 +11,10 @@ mod feature;
 mod kannala_brandt;
 mod lens;
 mod observation;
+mod projection_row;
 mod region;
 
-use nalgebra::{Matrix2x3, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix2x6, Vector2, Vector3};
 
 use crate::error::Error;
 use crate::simd::Scalar;
@@ -23,6 +24,7 @@ pub(crate) use distortion::DistortedPoint;
 pub use feature::Feature;
 pub use lens::{Lens, MAX_PARAMETERS, ParameterJacobian};
 pub use observation::Observation;
+pub(crate) use projection_row::{projection_row, restore_signs};
 
 /// Points nearer to the camera's plane than this, in metres, count as behind it.
 pub const MIN_DEPTH_M: f64 = 1e-6;
@@ -44,7 +46,7 @@ pub struct Projection {
 /// A camera: a lens and its parameters `fx, fy, cx, cy, distortion...`, validated.
 ///
 /// The fields are for reading; make a changed camera with [`Camera::new`] or [`Camera::plus`], which also find
-/// out again where the lens is valid.
+/// the region where the lens is valid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Which lens.
@@ -175,47 +177,43 @@ impl Camera {
         Some(self.scale_and_shift(distorted.x, distorted.y))
     }
 
-    /// Pixel and its derivative in the point.
-    #[inline]
-    pub fn project_with_point_derivative(
-        &self,
-        point: &Vector3<f64>,
-    ) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
-        let (x, y, inverse_depth) = at_unit_depth(point)?;
-        let distorted = self.distort(x, y)?;
-        Some((
-            self.scale_and_shift(distorted.x, distorted.y),
-            self.point_derivative(x, y, inverse_depth, &distorted),
-        ))
-    }
-
     /// Pixel and its derivatives in the point and in the camera parameters.
     #[inline]
     pub fn project_with_derivatives(&self, point: &Vector3<f64>) -> Option<Projection> {
         let (x, y, inverse_depth) = at_unit_depth(point)?;
         let distorted = self.distort(x, y)?;
-        let mut d_parameters = ParameterJacobian::zeros();
-        self.distortion_derivatives((x, y), &distorted, &mut d_parameters);
-        self.finish_parameters(distorted.x, distorted.y, &mut d_parameters);
         Some(Projection {
             pixel: self.scale_and_shift(distorted.x, distorted.y),
-            d_point: self.point_derivative(x, y, inverse_depth, &distorted),
-            d_parameters,
+            d_point: self
+                .twist_derivative(x, y, inverse_depth, &distorted)
+                .fixed_columns::<3>(0)
+                .into_owned(),
+            d_parameters: self.parameter_derivative(x, y, &distorted),
         })
     }
 
+    /// Derivative in the parameters of the pixel of a point at `(x, y)` in the plane at unit depth.
     #[inline]
-    fn point_derivative(
+    fn parameter_derivative(&self, x: f64, y: f64, distorted: &DistortedPoint<f64>) -> ParameterJacobian {
+        let mut jacobian = ParameterJacobian::zeros();
+        self.distortion_derivatives((x, y), distorted, &mut jacobian);
+        self.finish_parameters(distorted.x, distorted.y, &mut jacobian);
+        jacobian
+    }
+
+    /// Derivative in the left perturbation `[rho; phi]` of the pixel of a point that lies at `(x, y)` in the plane at unit depth.
+    #[inline]
+    fn twist_derivative(
         &self,
         x: f64,
         y: f64,
         inverse_depth: f64,
         lens: &DistortedPoint<f64>,
-    ) -> Matrix2x3<f64> {
-        let fx = self.parameters[0] * inverse_depth;
-        let fy = self.parameters[1] * inverse_depth;
-        let (a, b, c, d) = (fx * lens.along_x, fx * lens.cross_x, fy * lens.cross_y, fy * lens.along_y);
-        Matrix2x3::new(a, b, -(a * x + b * y), c, d, -(c * x + d * y))
+    ) -> Matrix2x6<f64> {
+        let (fx, fy) = (self.parameters[0], self.parameters[1]);
+        let rows = [(fx * lens.along_x, fx * lens.cross_x), (fy * lens.cross_y, fy * lens.along_y)];
+        let [u, v] = rows.map(|of_lens| projection_row(of_lens, inverse_depth, x, y));
+        Matrix2x6::new(u[0], u[1], -u[2], -u[3], u[4], u[5], v[0], v[1], -v[2], -v[3], v[4], v[5])
     }
 
     /// Unit vector, camera frame, along the ray of a pixel; None where no point that the lens sees has it.

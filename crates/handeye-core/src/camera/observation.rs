@@ -4,11 +4,11 @@
 //! the projection of the disc's centre: with focal length f, radius r, depth Z and tilt a the two differ by about
 //! `f r^2 sin(2 a) / (2 Z^2)` pixels. What is predicted here is the centroid.
 
-use nalgebra::{Matrix2x6, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2x6, Vector2};
 
 use super::circle::{BOUNDARY, Boundary, CIRCLE, Ellipse};
 use super::feature::Feature;
-use super::{Camera, Lens, ParameterJacobian};
+use super::{Camera, Lens, ParameterJacobian, at_unit_depth};
 use crate::se3::Se3;
 
 /// What a camera sees of a feature, with derivatives.
@@ -41,9 +41,10 @@ impl Camera {
         feature: &Feature,
     ) -> Option<(Vector2<f64>, Matrix2x6<f64>)> {
         if feature.radius == 0.0 {
-            let point = t_camera_target.act(&feature.position);
-            let (pixel, d_point) = self.project_with_point_derivative(&point)?;
-            return Some((pixel, point_to_twist(&point, &d_point)));
+            let (x, y, inverse_depth) = at_unit_depth(&t_camera_target.act(&feature.position))?;
+            let distorted = self.distort(x, y)?;
+            let pixel = self.scale_and_shift(distorted.x, distorted.y);
+            return Some((pixel, self.twist_derivative(x, y, inverse_depth, &distorted)));
         }
         self.observe_circle_with_derivatives(t_camera_target, feature, None)
     }
@@ -52,12 +53,12 @@ impl Camera {
     #[inline]
     pub fn observe_with_derivatives(&self, t_camera_target: &Se3, feature: &Feature) -> Option<Observation> {
         if feature.radius == 0.0 {
-            let point = t_camera_target.act(&feature.position);
-            let projection = self.project_with_derivatives(&point)?;
+            let (x, y, inverse_depth) = at_unit_depth(&t_camera_target.act(&feature.position))?;
+            let distorted = self.distort(x, y)?;
             return Some(Observation {
-                pixel: projection.pixel,
-                d_twist: point_to_twist(&point, &projection.d_point),
-                d_parameters: projection.d_parameters,
+                pixel: self.scale_and_shift(distorted.x, distorted.y),
+                d_twist: self.twist_derivative(x, y, inverse_depth, &distorted),
+                d_parameters: self.parameter_derivative(x, y, &distorted),
             });
         }
         let mut d_parameters = ParameterJacobian::zeros();
@@ -138,22 +139,6 @@ impl Camera {
         d_twist.set_row(1, &(ellipse.pull_back(&d_y) * self.parameters[1]).transpose());
         Some((self.scale_and_shift(centroid.x, centroid.y), d_twist))
     }
-}
-
-/// The derivative in the twist out of that in a point: `dP = rho + phi x P`.
-#[inline]
-fn point_to_twist(point: &Vector3<f64>, d_point: &SMatrix<f64, 2, 3>) -> Matrix2x6<f64> {
-    let mut d_twist = Matrix2x6::zeros();
-    for i in 0..2 {
-        let (a, b, c) = (d_point[(i, 0)], d_point[(i, 1)], d_point[(i, 2)]);
-        d_twist[(i, 0)] = a;
-        d_twist[(i, 1)] = b;
-        d_twist[(i, 2)] = c;
-        d_twist[(i, 3)] = point.y * c - point.z * b;
-        d_twist[(i, 4)] = point.z * a - point.x * c;
-        d_twist[(i, 5)] = point.x * b - point.y * a;
-    }
-    d_twist
 }
 
 #[cfg(test)]

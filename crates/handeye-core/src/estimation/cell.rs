@@ -1,6 +1,6 @@
 //! What stands in a cell, and what was measured there.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector6};
 
 use super::pose_measurement::PoseMeasurement;
 use crate::error::Error;
@@ -34,6 +34,8 @@ pub struct SeenBy {
     pub body: Body,
     /// Free parameters, without the scale of a board.
     pub parameters: usize,
+    /// Whether the prior comes from the very pixels of the measurements, which then say nothing new of the camera.
+    pub from_these_pixels: bool,
     /// `None`: nothing but what the pictures say.
     pub prior: Option<CameraPrior>,
 }
@@ -45,7 +47,9 @@ pub struct Station {
     pub pose: Se3,
     /// Twist of the flange in its own frame per joint, `6 x n`: truly `T exp(J dq)`; `None` where the arm is not known.
     pub joints: Option<DMatrix<f64>>,
-    /// The same per way of displacing a joint on its link, `6 x m`.
+    /// Twist of the flange in its own frame per second while the picture was taken; `None` where that is not known.
+    pub velocity: Option<Vector6<f64>>,
+    /// Twist per way of displacing a joint on its link, `6 x m`.
     pub links: Option<DMatrix<f64>>,
 }
 

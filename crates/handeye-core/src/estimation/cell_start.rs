@@ -48,9 +48,8 @@ pub fn start_of_cell(
         (still, std::cmp::Reverse(of(*c, *t).len()))
     });
     loop {
-        let open = |x: &[Option<Se3>], y: &[Option<Se3>], (c, t): (usize, usize)| {
-            x[c].is_none() || y[t].is_none()
-        };
+        let open =
+            |x: &[Option<Se3>], y: &[Option<Se3>], (c, t): (usize, usize)| x[c].is_none() || y[t].is_none();
         // Of those with a known end first: their other end follows.
         let next = pairs
             .iter()

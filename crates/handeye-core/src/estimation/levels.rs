@@ -37,6 +37,14 @@ pub struct Level {
 const WALL: f64 = 0.5;
 
 impl Level {
+    /// The level at which its component is as good as absent.
+    pub(super) fn nothing(&self) -> f64 {
+        match self.prior {
+            LevelPrior::Deviation { nothing, .. } => nothing,
+            LevelPrior::Ratio { .. } => self.start,
+        }
+    }
+
     /// Minus the logarithm of the prior density of the logarithm `t`, its slope and its curvature.
     pub(super) fn penalty(&self, t: f64) -> (f64, f64, f64) {
         match self.prior {

@@ -84,9 +84,12 @@ pub(super) fn linearise(cell: &Cell, guess: &Guess) -> Linearisation {
                 rows.b.view_mut((at, *column), (6, 1)).copy_from(&m.pose.sensitivity.column(j));
             }
             let weight = 1.0 / m.variance_px2;
-            for (a, row) in pixel.iter().enumerate() {
+            // Pixels count once: where the camera's prior holds them already, they say nothing new of it.
+            let known =
+                if cell.cameras[m.camera].from_these_pixels { cell.cameras[m.camera].parameters } else { 0 };
+            for (a, row) in pixel.iter().enumerate().skip(known) {
                 gradient[*row] += weight * m.pose.camera_gradient[a];
-                for (b, column) in pixel.iter().enumerate() {
+                for (b, column) in pixel.iter().enumerate().skip(known) {
                     information[(*row, *column)] += weight * m.pose.camera_information[(a, b)];
                 }
             }

@@ -52,6 +52,7 @@ pub(super) enum Effect {
 
 /// A prior on parameters.
 struct Prior {
+    of: &'static str,
     levels: Vec<usize>,
     first: usize,
     count: usize,
@@ -76,6 +77,7 @@ impl Prior {
 }
 
 struct Noise {
+    of: &'static str,
     levels: Vec<usize>,
     roots: Vec<DMatrix<f64>>,
 }
@@ -95,6 +97,8 @@ pub(super) struct Mixed {
     pub size: usize,
     /// Those of them before the recurring ones.
     pub told: usize,
+    /// Names of the components, with the range of their levels.
+    pub components: Vec<(&'static str, std::ops::Range<usize>)>,
     /// Names of the components, with the range of their constants.
     pub constants: Vec<(&'static str, std::ops::Range<usize>)>,
     width: usize,
@@ -129,6 +133,8 @@ pub(super) struct Evaluation {
     pub theta: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
+    /// Their information under the working model, where an answer was wanted.
+    pub information: DMatrix<f64>,
 }
 
 impl Mixed {
@@ -140,18 +146,21 @@ impl Mixed {
         cell: &super::cell::Cell,
     ) -> Self {
         let mut levels = Vec::new();
+        let mut owners = Vec::new();
         let (mut noises, mut priors, mut constants) = (Vec::new(), Vec::new(), Vec::new());
         let mut blocks: Vec<(bool, &'static str, Vec<usize>, Vec<DMatrix<f64>>)> = Vec::new();
         for component in components {
             let first = levels.len();
             levels.extend(component.levels());
+            owners.push((component.name(), first..levels.len()));
             for term in component.terms(cell, linearisation) {
                 let of: Vec<usize> = term.levels.iter().map(|l| first + l).collect();
                 match term.effect {
-                    Effect::Noise(roots) => noises.push(Noise { levels: of, roots }),
+                    Effect::Noise(roots) => noises.push(Noise { of: component.name(), levels: of, roots }),
                     Effect::Constant(columns) => blocks.push((false, component.name(), of, columns)),
                     Effect::Recurring(columns) => blocks.push((true, component.name(), of, columns)),
                     Effect::Prior { first, information, mean } => priors.push(Prior {
+                        of: component.name(),
                         levels: of,
                         first,
                         count: mean.len(),
@@ -170,6 +179,7 @@ impl Mixed {
         for (recurring, name, of, columns) in &blocks {
             let count = columns.first().map_or(0, DMatrix::ncols);
             priors.push(Prior {
+                of: name,
                 levels: of.clone(),
                 first: size,
                 count,
@@ -215,6 +225,7 @@ impl Mixed {
             levels,
             size,
             told,
+            components: owners,
             constants,
             width,
             stations,
@@ -240,7 +251,7 @@ impl Mixed {
         let n = self.size;
         let noise: Vec<f64> = self.noises.iter().map(|x| Self::deviation(&x.levels, t)).collect();
         let prior: Vec<f64> = self.priors.iter().map(|x| Self::deviation(&x.levels, t)).collect();
-        let mut sum = vec![0.0; (n + 1) * self.width];
+        let mut sum = vec![0.0; (n + 1).next_multiple_of(TOGETHER) * self.width];
         let mut constant = 0.0;
         let mut whitened: Vec<(DMatrix<f64>, Vec<f64>)> = Vec::with_capacity(self.stations.len());
         for (k, station) in self.stations.iter().enumerate() {
@@ -286,28 +297,25 @@ impl Mixed {
         if !value.is_finite() {
             return None;
         }
+        let apart = wanted == Wanted::Answer && self.told < n;
         let covariance = match wanted {
-            Wanted::Value => DMatrix::zeros(0, 0),
-            _ => factor.inverse(),
+            Wanted::Slope => factor.inverse(),
+            Wanted::Answer if !apart => factor.inverse(),
+            _ => DMatrix::zeros(0, 0),
         };
-        let mut evaluation = Evaluation { value, slope, curvature, theta, covariance };
+        let mut evaluation =
+            Evaluation { value, slope, curvature, theta, covariance, information: DMatrix::zeros(0, 0) };
         match wanted {
             Wanted::Value => {}
             Wanted::Slope => self.differentiate(&whitened, &noise, &prior, &mut evaluation),
-            Wanted::Answer if self.told < n => self.answer_apart(&noise, &prior, &mut evaluation)?,
-            Wanted::Answer => {}
+            Wanted::Answer if apart => self.answer_apart(&noise, &prior, &mut evaluation)?,
+            Wanted::Answer => evaluation.information = information,
         }
         Some(evaluation)
     }
 
     /// Adds a prior at deviation `s`; what it adds to twice the value.
-    fn add_prior(
-        &self,
-        p: &Prior,
-        s: f64,
-        information: &mut DMatrix<f64>,
-        right: &mut DVector<f64>,
-    ) -> f64 {
+    fn add_prior(&self, p: &Prior, s: f64, information: &mut DMatrix<f64>, right: &mut DVector<f64>) -> f64 {
         let weight = s.powi(-2);
         let mut constant = 2.0 * p.count as f64 * s.ln();
         match &p.information {
@@ -479,28 +487,105 @@ impl Mixed {
         }
         let mut shared = DMatrix::zeros(p, recurring);
         let mut own = DMatrix::zeros(p, p);
+        let n = self.size;
+        let mut sum = vec![0.0; (n + 1).next_multiple_of(TOGETHER) * self.width];
+        let mut here = vec![0.0; sum.len()];
         for (k, station) in self.stations.iter().enumerate() {
             let (factor, _) = self.factor(station, k, noise, Some(prior))?;
             let mut rows = station.rows.clone();
             dispatch(self.unit, Whiten { factor: &factor, rows: &mut rows, width: self.width });
-            let all = DMatrix::from_row_slice(station.size, self.width, &rows);
-            let b = all.columns(0, p);
-            let mut z = all.columns(p, recurring).into_owned();
-            for (mut column, s) in z.column_iter_mut().zip(&scales) {
-                column *= *s;
+            here.fill(0.0);
+            dispatch(self.unit, Accumulate { rows: &rows, width: self.width, size: p, sum: &mut here });
+            for (total, one) in sum.iter_mut().zip(&here) {
+                *total += one;
             }
-            information.gemm_tr(1.0, &b.into_owned(), &b.into_owned(), 1.0);
-            right -= b.tr_mul(&all.column(self.size));
-            let here = b.tr_mul(&z);
-            own.gemm(1.0, &here, &here.transpose(), 1.0);
-            shared += here;
+            let z = DMatrix::from_fn(p, recurring, |i, j| here[i * self.width + p + j] * scales[j]);
+            own.gemm(1.0, &z, &z.transpose(), 1.0);
+            shared += z;
+        }
+        for i in 0..p {
+            right[i] -= sum[i * self.width + n];
+            for j in i..p {
+                let value = sum[i * self.width + j];
+                information[(i, j)] += value;
+                if i != j {
+                    information[(j, i)] += value;
+                }
+            }
         }
         let bread = Factor::new(&information)?.inverse();
         let theta = &bread * right;
         let meat = &shared * shared.transpose() - own;
         evaluation.covariance = &bread + &bread * meat * &bread;
         evaluation.theta = theta;
+        evaluation.information = information;
         Some(())
+    }
+
+    /// Information under the working model.
+    pub fn information(&self, t: &DVector<f64>) -> Option<DMatrix<f64>> {
+        Some(self.evaluate(t, Wanted::Answer)?.information)
+    }
+}
+
+impl Mixed {
+    /// The penalised likelihood without a component: its deviations at nothing, its ratios at their start.
+    pub fn value_without(&self, names: &[&str], t: &DVector<f64>) -> Option<f64> {
+        let mut without = t.clone();
+        for (_, range) in self.components.iter().filter(|(name, _)| names.contains(name)) {
+            for l in range.clone() {
+                without[l] = self.levels[l].nothing().ln();
+            }
+        }
+        let penalty = |t: &DVector<f64>| -> f64 {
+            self.levels.iter().zip(t.iter()).map(|(level, t)| level.penalty(*t).0).sum()
+        };
+        // Likelihoods are compared: what is believed of the levels has no say.
+        Some(self.evaluate(&without, Wanted::Value)?.value - penalty(&without) + penalty(t))
+    }
+
+    /// How much each component moves the measurements: mean square of their displacement in standard deviations of the
+    /// pixels, per degree of freedom, at levels `exp(t)` and parameters theta.
+    pub fn misfit(&self, t: &DVector<f64>, theta: &DVector<f64>) -> Option<Vec<(&'static str, f64)>> {
+        let mut sums: Vec<(&'static str, f64)> =
+            self.components.iter().map(|(name, _)| (*name, 0.0)).collect();
+        let mut add = |of: &str, value: f64| {
+            for (name, sum) in &mut sums {
+                if *name == of {
+                    *sum += value;
+                }
+            }
+        };
+        let mut rows = 0;
+        for (k, station) in self.stations.iter().enumerate() {
+            rows += station.size;
+            let factor = station.pixels.clone().cholesky()?;
+            for x in &self.noises {
+                let mut root = x.roots[k].clone();
+                factor.l_dirty().solve_lower_triangular_mut(&mut root);
+                add(x.of, Self::deviation(&x.levels, t).powi(2) * root.norm_squared());
+            }
+            for p in &self.priors {
+                let mut moved = if p.recurring {
+                    // What it is here is not told; what it may be is.
+                    station.columns(p, self.width) * Self::deviation(&p.levels, t)
+                } else {
+                    let mut values = theta.rows(p.first, p.count).into_owned();
+                    if let Some(mean) = &p.mean {
+                        values -= mean;
+                    }
+                    DMatrix::from_column_slice(
+                        station.size,
+                        1,
+                        (station.columns(p, self.width) * values).as_slice(),
+                    )
+                };
+                factor.l_dirty().solve_lower_triangular_mut(&mut moved);
+                add(p.of, moved.norm_squared());
+            }
+        }
+        sums.iter_mut().for_each(|(_, sum)| *sum /= rows as f64);
+        Some(sums)
     }
 }
 
@@ -540,6 +625,9 @@ impl Kernel for Whiten<'_> {
     }
 }
 
+/// Columns whose products are summed together.
+const TOGETHER: usize = 4;
+
 /// Adds the products of all pairs of columns: whole vectors of the upper triangle, row by row.
 struct Accumulate<'a> {
     rows: &'a [f64],
@@ -553,14 +641,22 @@ impl Kernel for Accumulate<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        for i in 0..self.size {
+        for i in (0..self.size).step_by(TOGETHER) {
             let first = i / S::LANES * S::LANES;
             for at in (first..self.width).step_by(S::LANES) {
-                let mut total = simd.load(&self.sum[i * self.width + at..]);
-                for row in self.rows.chunks_exact(self.width) {
-                    total = simd.splat(row[i]).mul_add(simd.load(&row[at..]), total);
+                let mut totals = [simd.splat(0.0); TOGETHER];
+                for (k, total) in totals.iter_mut().enumerate() {
+                    *total = simd.load(&self.sum[(i + k) * self.width + at..]);
                 }
-                total.store(&mut self.sum[i * self.width + at..]);
+                for row in self.rows.chunks_exact(self.width) {
+                    let values = simd.load(&row[at..]);
+                    for (k, total) in totals.iter_mut().enumerate() {
+                        *total = simd.splat(row[i + k]).mul_add(values, *total);
+                    }
+                }
+                for (k, total) in totals.iter().enumerate() {
+                    total.store(&mut self.sum[(i + k) * self.width + at..]);
+                }
             }
         }
     }

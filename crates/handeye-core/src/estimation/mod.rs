@@ -22,13 +22,14 @@ mod pose_measurement;
 mod posterior;
 mod start;
 mod systems;
-pub mod tuning;
 mod twists;
+mod view_sets;
 
 pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station};
 pub use cell_start::{CellStart, start_of_cell};
 pub use components::Assumptions;
 pub use levels::{Level, LevelPrior};
 pub use pose_measurement::{PoseMeasurement, compress, shrunk_variances};
-pub use posterior::{Node, Options, Posterior, estimate};
+pub use posterior::{Attribution, Node, Options, Posterior, estimate};
 pub use start::{ChainStart, WeakPrior, start_from_poses};
+pub use view_sets::{LinearisedView, NoiseLevel, SetFit, ViewSets};

@@ -8,7 +8,11 @@ const LEAST_CURVATURE: f64 = 0.25;
 const WIDENING: f64 = 1.1;
 
 /// Points, each with the logarithm of the density by which they were drawn.
-pub(super) fn around(mode: &DVector<f64>, curvature: &DMatrix<f64>, pairs: usize) -> Vec<(DVector<f64>, f64)> {
+pub(super) fn around(
+    mode: &DVector<f64>,
+    curvature: &DMatrix<f64>,
+    pairs: usize,
+) -> Vec<(DVector<f64>, f64)> {
     let d = mode.len();
     let eigen = SymmetricEigen::new((curvature + curvature.transpose()) * 0.5);
     let mut root = eigen.eigenvectors;

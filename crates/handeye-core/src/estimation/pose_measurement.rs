@@ -41,18 +41,10 @@ pub fn compress(
     camera: &Camera,
     pose: &Se3,
     parameters: Option<&PixelParameters>,
-<<<<<<< HEAD:crates/handeye-core/src/estimation/pose_measurement.rs
 ) -> Result<PoseMeasurement, Error> {
-    let block =
-        view_block(problem, k, camera, 0.0, pose, 1.0, parameters, Loss::Squared).ok_or_else(|| {
-            Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
-        })?;
-=======
-) -> Result<CompressedView, Error> {
     let block = view_block(problem, k, camera, pose, 1.0, parameters).ok_or_else(|| {
         Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
     })?;
->>>>>>> house:crates/handeye-core/src/evidence/compressed.rs
     let covariance = block
         .m
         .cholesky()

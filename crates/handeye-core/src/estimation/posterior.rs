@@ -58,12 +58,31 @@ pub struct Posterior {
     pub degrees_of_freedom: Vec<f64>,
     /// Minus the logarithm of the posterior density of the levels at their mode.
     pub value: f64,
+    /// Components of the error: by how much the likelihood falls without each, and how far each moves the measurements
+    /// in standard deviations of the pixels, squared.
+    pub attribution: Vec<Attribution>,
+    /// By how much the likelihood falls where the robot is taken as exact.
+    pub robot_loss: f64,
+    /// Information at the mode of the levels, recurring errors taken as new at every station: what that of a further
+    /// station adds to.
+    pub information: DMatrix<f64>,
     /// Linearisations.
     pub rounds: usize,
     /// Steps of the levels in all rounds.
     pub steps: usize,
     /// Whether poses and levels came to rest.
     pub converged: bool,
+}
+
+/// What a component of the error explains.
+#[derive(Clone, Debug)]
+pub struct Attribution {
+    /// Its name.
+    pub name: &'static str,
+    /// By how much the logarithm of the likelihood falls without it.
+    pub loss: f64,
+    /// Mean square displacement of the measurements in standard deviations of the pixels.
+    pub misfit: f64,
 }
 
 /// A step of the poses below this share of its standard deviation is the last.
@@ -108,8 +127,8 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
         Some(found) => found,
         None => find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()))?,
     };
-    let (nodes, value) = average(&mixed, &found, options.pairs)?;
-    Ok(gather(cell, &guess, &mixed, nodes, value, (rounds, steps, converged && found.at_rest)))
+    let nodes = average(&mixed, &found, options.pairs)?;
+    gather(cell, &guess, &mixed, nodes, &found, (rounds, steps, converged && found.at_rest))
 }
 
 fn assemble(cell: &Cell, guess: &Guess, components: &[Box<dyn Component>], weak: &WeakPrior) -> Mixed {
@@ -193,9 +212,8 @@ fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Error> {
 fn damped_step(now: &Evaluation, damping: f64) -> DVector<f64> {
     let eigen = nalgebra::SymmetricEigen::new(now.curvature.clone());
     let along = eigen.eigenvectors.tr_mul(&now.slope);
-    let scaled = DVector::from_fn(along.len(), |i, _| {
-        -along[i] / (eigen.eigenvalues[i].abs().max(0.05) + damping)
-    });
+    let scaled =
+        DVector::from_fn(along.len(), |i, _| -along[i] / (eigen.eigenvalues[i].abs().max(0.05) + damping));
     let mut step = &eigen.eigenvectors * scaled;
     let longest = step.amax();
     if longest > LONGEST_STEP {
@@ -204,13 +222,26 @@ fn damped_step(now: &Evaluation, damping: f64) -> DVector<f64> {
     step
 }
 
-/// The nodes with their shares, and the penalised likelihood at the mode.
-fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<(Vec<Node>, f64), Error> {
+/// The nodes with their shares.
+fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<Vec<Node>, Error> {
+    let points = nodes::around(&mode.t, &mode.curvature, pairs);
+    let mut answers: Vec<Option<Evaluation>> = points.iter().map(|_| None).collect();
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let share = points.len().div_ceil(threads);
+    std::thread::scope(|scope| {
+        for (points, answers) in points.chunks(share).zip(answers.chunks_mut(share)) {
+            scope.spawn(move || {
+                for ((t, _), answer) in points.iter().zip(answers) {
+                    *answer = mixed.evaluate(t, Wanted::Answer);
+                }
+            });
+        }
+    });
     let mut nodes = Vec::new();
     let mut logs = Vec::new();
-    for (t, density) in nodes::around(&mode.t, &mode.curvature, pairs) {
+    for ((t, density), answer) in points.into_iter().zip(answers) {
         // Levels at which the model is singular have no share.
-        let Some(answer) = mixed.evaluate(&t, Wanted::Answer) else { continue };
+        let Some(answer) = answer else { continue };
         logs.push(mode.value - answer.value - density);
         nodes.push(Node {
             weight: 0.0,
@@ -227,7 +258,7 @@ fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<(Vec<Node>, f64),
     for (node, log) in nodes.iter_mut().zip(&logs) {
         node.weight = (log - most).exp() / total;
     }
-    Ok((nodes, mode.value))
+    Ok(nodes)
 }
 
 /// Fewest degrees of freedom: below, regions would have no useful quantile.
@@ -238,9 +269,9 @@ fn gather(
     guess: &Guess,
     mixed: &Mixed,
     nodes: Vec<Node>,
-    value: f64,
+    mode: &Mode,
     (rounds, steps, converged): (usize, usize, bool),
-) -> Posterior {
+) -> Result<Posterior, Error> {
     let told = mixed.told;
     let mut theta = DVector::zeros(told);
     for node in &nodes {
@@ -257,7 +288,11 @@ fn gather(
     let moved = guess.moved(theta.as_slice());
     let poses = 6 * (cell.cameras.len() + cell.targets.len());
     theta.rows_mut(0, poses).fill(0.0);
-    Posterior {
+    let attribution = attribution(mixed, mode)?;
+    let of_robot: Vec<&str> =
+        attribution.iter().map(|a| a.name).filter(|n| components::is_of_robot(n)).collect();
+    let without = mixed.value_without(&of_robot, &mode.t).ok_or_else(singular)?;
+    Ok(Posterior {
         x: moved.x,
         y: moved.y,
         theta,
@@ -266,11 +301,26 @@ fn gather(
         level_names: mixed.levels.iter().map(|l| l.name).collect(),
         nodes,
         degrees_of_freedom,
-        value,
+        value: mode.value,
+        attribution,
+        robot_loss: without - mode.value,
+        information: mixed.information(&mode.t).ok_or_else(singular)?,
         rounds,
         steps,
         converged,
-    }
+    })
+}
+
+fn attribution(mixed: &Mixed, mode: &Mode) -> Result<Vec<Attribution>, Error> {
+    let theta = mixed.evaluate(&mode.t, Wanted::Answer).ok_or_else(singular)?.theta;
+    let misfit = mixed.misfit(&mode.t, &theta).ok_or_else(singular)?;
+    misfit
+        .into_iter()
+        .map(|(name, misfit)| {
+            let without = mixed.value_without(&[name], &mode.t).ok_or_else(singular)?;
+            Ok(Attribution { name, loss: without - mode.value, misfit })
+        })
+        .collect()
 }
 
 /// Degrees of freedom of a covariance that is known only so well: a scaled chi-square whose logarithm spreads as the

@@ -39,6 +39,19 @@ pub enum CornerKind {
     Quadrants,
 }
 
+/// A corner that was fitted.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    /// Where it is.
+    pub place: [f64; 2],
+    /// Covariance of the place in px^2, for independent residuals of one grey value.
+    pub spread: [[f64; 2]; 2],
+    /// Root mean square of the residuals, in grey values of the smoothed picture.
+    pub misfit: f64,
+    /// Grey step across the edges.
+    pub contrast: f64,
+}
+
 /// Fits corners in a picture, one after the other.
 pub struct CornerFitter<'a, T> {
     picture: Picture<'a, T>,
@@ -64,7 +77,7 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
     /// Fits a corner; `None` where there is none, or where it is not near the guess.
     ///
     /// A `rough` fit ends near the place, as is enough where it tells another fit where to begin.
-    pub fn fit(&mut self, guess: &CornerGuess, rough: bool) -> Option<[f64; 2]> {
+    pub fn fit(&mut self, guess: &CornerGuess, rough: bool) -> Option<Corner> {
         if !guess.is_usable() {
             return None;
         }
@@ -85,7 +98,7 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
         start[LOG_BLUR] = self.log_blur;
         self.solve_greys(&mut start)?;
         let tolerance = if rough { ROUGH_TOLERANCE_PX } else { STEP_TOLERANCE_PX };
-        let fit = self.minimised(start, guess.curvatures, tolerance)?;
+        let (fit, equations) = self.minimised(start, guess.curvatures, tolerance)?;
         let moved = (fit[X] - start[X]).hypot(fit[Y] - start[Y]);
         let good = moved <= (0.25 * radius).max(1.5)
             && fit[PRODUCT].abs() * 2.0 >= LEAST_CONTRAST
@@ -94,7 +107,16 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
             return None;
         }
         self.log_blur = fit[LOG_BLUR];
-        Some([origin[0] + fit[X], origin[1] + fit[Y]])
+        let ridge =
+            SMatrix::<f64, N, N>::from_diagonal(&equations.normal.diagonal().map(|d| 1e-9 * d + 1e-12));
+        let covariance = (equations.normal + ridge).cholesky()?.inverse();
+        let weight: f64 = self.window.samples.root.iter().map(|root| root * root).sum();
+        Some(Corner {
+            place: [origin[0] + fit[X], origin[1] + fit[Y]],
+            spread: [X, Y].map(|i| [X, Y].map(|k| covariance[(i, k)])),
+            misfit: (equations.cost.max(0.0) / weight.max(1.0)).sqrt(),
+            contrast: 2.0 * fit[PRODUCT].abs(),
+        })
     }
 
     /// Solves for the greys, which enter linearly, once for the first guess of the rest.
@@ -109,8 +131,13 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
         Some(())
     }
 
-    /// Levenberg-Marquardt.
-    fn minimised(&self, mut p: Parameters, bends: [f64; 2], tolerance: f64) -> Option<Parameters> {
+    /// Levenberg-Marquardt; also the equations at the end or one short step before it.
+    fn minimised(
+        &self,
+        mut p: Parameters,
+        bends: [f64; 2],
+        tolerance: f64,
+    ) -> Option<(Parameters, Equations)> {
         let mut current = self.equations(&p, bends);
         let mut damping = 1e-3;
         for _ in 0..MAX_ITERATIONS {
@@ -135,7 +162,7 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
                 damping *= 10.0;
             }
         }
-        p.iter().all(|x| x.is_finite()).then_some(p)
+        p.iter().all(|x| x.is_finite()).then_some((p, current))
     }
 
     fn equations(&self, p: &Parameters, bends: [f64; 2]) -> Equations {
@@ -206,10 +233,10 @@ mod tests {
                 let picture = Picture::new(&grey, SIDE, SIDE).unwrap();
                 let start = guess([place[0] + 0.7, place[1] - 0.5], [angles[0] + 0.05, angles[1] - 0.04]);
                 let mut fitter = CornerFitter::new(picture, kind);
-                let near = fitter.fit(&start, true).unwrap();
+                let near = fitter.fit(&start, true).unwrap().place;
                 let error = (near[0] - place[0]).hypot(near[1] - place[1]);
                 assert!(error < 0.05, "{kind:?} {place:?}: {error}");
-                let found = fitter.fit(&CornerGuess { place: near, ..start }, false).unwrap();
+                let found = fitter.fit(&CornerGuess { place: near, ..start }, false).unwrap().place;
                 let error = (found[0] - place[0]).hypot(found[1] - place[1]);
                 assert!(error < 1e-3, "{kind:?} {place:?}: {error}");
             }

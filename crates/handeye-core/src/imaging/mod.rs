@@ -6,6 +6,7 @@ mod corner_equations;
 mod corner_guess;
 mod corner_window;
 mod correlation;
+pub mod neighbours;
 pub mod plane_map;
 pub mod printed;
 mod raster;

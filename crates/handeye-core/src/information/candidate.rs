@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix4, Matrix6, Vector2};
 use super::belief::{Belief, CHAIN};
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
-use crate::least_squares::{Moments, PixelColumns, PixelParameters, Side, ViewBlock, marginalised};
+use crate::least_squares::{Moments, PixelColumns, PixelParameters, ViewBlock, marginalised};
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
 
@@ -33,8 +33,8 @@ pub struct CandidateModel<'a> {
     pub features: &'a [Feature],
     /// Expected pixel noise, px.
     pub pixel_sigma: f64,
-    /// Side and square root of the covariance of the robot's error.
-    pub robot: Option<(Side, Matrix6<f64>)>,
+    /// Error of the robot at the candidate's station.
+    pub robot: RobotError,
     /// Which pixel parameters are free.
     pub pixel_parameters: Option<&'a PixelParameters>,
     /// Number of kinematic parameters (their Jacobian comes with each candidate).
@@ -51,7 +51,7 @@ pub struct Supposition<'a> {
     /// What is believed.
     pub belief: &'a Belief,
     /// As [`CandidateModel::robot`].
-    pub robot: Option<(Side, Matrix6<f64>)>,
+    pub robot: RobotError,
 }
 
 /// A candidate's information `F F'` in all global parameters.
@@ -63,28 +63,42 @@ pub struct Candidate {
     pub seen: usize,
 }
 
-/// How errors of the joints move one candidate, where the arm's kinematics are known: `A <- exp(D dq) A`.
-#[derive(Clone, Debug)]
-pub struct CandidateJoints {
-    /// Columns of `D` for the offsets that are parameters, `6 x kinematic_count`.
-    pub offsets: DMatrix<f64>,
-    /// Square root of the covariance that noise of the joints gives `A` on its left; takes the place of the model's
-    /// robot error.
-    pub noise_root: Option<Matrix6<f64>>,
+/// Error of the robot that is new at every station: square roots of the covariances of twists on both sides of `A`.
+///
+/// Eye-in-hand: `A = T_flange_base`, so left is the flange and right the base; eye-to-hand the other way round.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RobotError {
+    /// On the left, `X exp(eps) A Y`; `None` where there is none.
+    pub left: Option<Matrix6<f64>>,
+    /// On the right, `X A exp(eps) Y`.
+    pub right: Option<Matrix6<f64>>,
 }
 
-impl CandidateJoints {
-    /// From `D` of all joints, `6 x n`: which offsets are free, and the standard deviation of each joint's noise.
-    pub fn new(jacobian: &DMatrix<f64>, free: &[usize], noise: Option<&[f64]>) -> Self {
-        let noise_root = noise.map(|sigmas| {
-            let mut covariance = DMatrix::zeros(6, 6);
-            for (column, sigma) in jacobian.column_iter().zip(sigmas) {
-                covariance += column * column.transpose() * (sigma * sigma);
-            }
-            Matrix6::from_column_slice(semidefinite_root(covariance).as_slice())
-        });
-        Self { offsets: jacobian.select_columns(free), noise_root }
+impl RobotError {
+    /// On the left alone.
+    pub fn on_left(root: Matrix6<f64>) -> Self {
+        Self { left: Some(root), right: None }
     }
+
+    /// On the right alone.
+    pub fn on_right(root: Matrix6<f64>) -> Self {
+        Self { left: None, right: Some(root) }
+    }
+
+    /// Whether there is none.
+    pub fn is_none(&self) -> bool {
+        self.left.is_none() && self.right.is_none()
+    }
+}
+
+/// How errors of the arm move one candidate, where its kinematics are known: `A <- exp(D dq) A`.
+#[derive(Clone, Debug)]
+pub struct CandidateJoints {
+    /// Columns of the arm's constant errors that are parameters, `6 x kinematic_count`.
+    pub constants: DMatrix<f64>,
+    /// Square root of the covariance that noise of the joints gives `A` on its left, `6 x n`; beside the model's robot
+    /// error.
+    pub noise_root: Option<DMatrix<f64>>,
 }
 
 /// Information of a view, being summed.
@@ -119,13 +133,25 @@ impl CandidateModel<'_> {
         }
         let (m, g) = sums.moments.finish();
         let block = ViewBlock { m, g, columns: sums.columns, squared_px: 0.0 };
-        let of_joints = joints.and_then(|j| j.noise_root).map(|root| (Side::Left, root));
-        let Some((side, root)) = &of_joints.or(self.robot) else { return Some((block, seen)) };
-        let before = match side {
-            Side::Left => self.x,
-            Side::Right => self.x * *motion,
-        };
-        Some((marginalised(&block, &(before.adjoint() * root)), seen))
+        let joints = joints.and_then(|j| j.noise_root.as_ref());
+        if self.robot.is_none() && joints.is_none() {
+            return Some((block, seen));
+        }
+        let (left, right) = (self.x.adjoint(), (self.x * *motion).adjoint());
+        let mut covariance = Matrix6::zeros();
+        for (before, root) in [(left, self.robot.left), (right, self.robot.right)] {
+            if let Some(root) = root {
+                let moved = before * root;
+                covariance += moved * moved.transpose();
+            }
+        }
+        if let Some(root) = joints {
+            let moved = left * root;
+            covariance += &moved * moved.transpose();
+        }
+        let covariance = DMatrix::from_column_slice(6, 6, covariance.as_slice());
+        let root = Matrix6::from_column_slice(semidefinite_root(covariance).as_slice());
+        Some((marginalised(&block, &root), seen))
     }
 
     /// Empty sums for [`CandidateModel::sum`].
@@ -188,7 +214,7 @@ impl CandidateModel<'_> {
         map.view_mut((0, 6), (6, 6)).copy_from(&(self.x * *motion).adjoint());
         map.view_mut((6, CHAIN), (extra, extra)).fill_with_identity();
         if let Some(joints) = joints {
-            let columns = self.x.adjoint() * &joints.offsets;
+            let columns = self.x.adjoint() * &joints.constants;
             map.view_mut((0, CHAIN + extra), columns.shape()).copy_from(&columns);
         }
         let factor = map.tr_mul(&semidefinite_root(block.matrix()));

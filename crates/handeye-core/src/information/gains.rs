@@ -54,7 +54,7 @@ impl CandidateModel<'_> {
             for one in supposed {
                 self.check(one.belief)?;
                 let prepared = criterion.prepare(one.belief)?;
-                scorer.add_goal(one.weight, one.belief, one.robot.as_ref(), &quantity, prepared)?;
+                scorer.add_goal(one.weight, one.belief, &one.robot, &quantity, prepared)?;
             }
             scorer.score(motions, execution, &mut gains)?;
             return Ok(gains);
@@ -83,7 +83,8 @@ impl CandidateModel<'_> {
         joints: &[CandidateJoints],
     ) -> Result<Vec<f64>, Error> {
         self.check(belief)?;
-        if joints.len() != motions.len() || joints.iter().any(|j| j.offsets.ncols() != self.kinematic_count) {
+        if joints.len() != motions.len() || joints.iter().any(|j| j.constants.ncols() != self.kinematic_count)
+        {
             return Err(Error::invalid(format!(
                 "expected joints of {} motions with {} free offsets each",
                 motions.len(),

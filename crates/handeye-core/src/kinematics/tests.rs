@@ -254,6 +254,22 @@ fn redundant_and_short_arms_are_solved_too() {
 }
 
 #[test]
+fn every_joint_has_its_limits() {
+    let mut random = Random::new(12);
+    let chain = random_chain(&mut random, 7);
+    let q = posture(&mut random, &chain);
+    assert!(chain.within_limits(&q));
+    for (i, joint) in chain.joints().iter().enumerate() {
+        for beyond in [joint.lower - 1e-9, joint.upper + 1e-9, f64::NAN] {
+            let mut wrong = q.clone();
+            wrong[i] = beyond;
+            assert!(!chain.within_limits(&wrong), "joint {i} at {beyond}");
+        }
+    }
+    assert!(!chain.within_limits(&q[..6]));
+}
+
+#[test]
 fn unusable_chains_and_configurations_are_refused() {
     let joint = *ur5e().joints().first().unwrap();
     let refused = |joint: Joint| Chain::new(vec![joint], Se3::identity()).is_err();

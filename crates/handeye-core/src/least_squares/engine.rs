@@ -1,4 +1,4 @@
-//! What an iteration asks of whatever linearises the views.
+//! The interface between the iteration and the two engines that linearise views.
 
 use nalgebra::DMatrix;
 
@@ -9,7 +9,7 @@ use crate::positive::Factor;
 /// multiple correlation of a parameter with those before it; rounding alone leaves about 1e-15.
 const PIVOT_LIMIT: f64 = 1e-13;
 
-/// A step that the normal equations propose.
+/// The step that solves the normal equations.
 pub(super) struct Proposal {
     /// Decrease of the (doubled) quadratic model.
     pub predicted: f64,
@@ -29,10 +29,10 @@ pub(super) trait Engine {
     /// there.
     fn attempt(&mut self) -> Option<f64>;
 
-    /// Makes the attempted state the state.
+    /// Moves to the attempted state.
     fn accept(&mut self);
 
-    /// Tells of the state.
+    /// The solution at the state.
     fn report(&mut self, initial_cost: f64, iterations: usize, ending: Ending) -> Solution;
 }
 

@@ -51,11 +51,11 @@ pub(super) struct Measurements {
     pub views: usize,
 }
 
-/// What a group costs beside its points, in points.
+/// Fixed cost of a group, as a number of points.
 const GROUP_COST: usize = 12;
 
 impl Measurements {
-    /// With views in as many parts as go fastest; None for what lanes do not know: circles and fisheyes.
+    /// Views split into as many parts as run fastest; None for circles and fisheyes, which have no batched engine.
     pub fn new(camera: &Camera, views: &[View<'_>]) -> Option<Self> {
         let is_circle = |feature: &Feature| feature.radius != 0.0;
         if camera.lens == Lens::KannalaBrandt || views.iter().any(|view| view.features.iter().any(is_circle))

@@ -20,7 +20,7 @@ pub struct Problem {
     pixels: Vec<Vector2<f64>>,
     offsets: Vec<usize>,
     motions: Vec<Se3>,
-    /// As lanes want them; none for circles and fisheyes.
+    /// Packed for vector lanes; none for circles and fisheyes.
     measurements: Option<Measurements>,
 }
 
@@ -79,7 +79,7 @@ impl Problem {
             .collect()
     }
 
-    /// As lanes want them; None for circles and fisheyes.
+    /// Packed for vector lanes; None for circles and fisheyes.
     pub(super) fn measurements(&self) -> Option<&Measurements> {
         self.measurements.as_ref()
     }

@@ -12,8 +12,8 @@ use super::view_by_view::ViewByView;
 use crate::error::Error;
 use crate::simd::VectorUnit;
 
-/// Damping to begin with, and by how much a step that the model foresaw lowers it at most: what is damped beyond need
-/// keeps poorly determined directions from converging as fast as Newton's method would.
+/// First damping, and the smallest factor by which a step that went as predicted lowers it. More damping than needed
+/// slows convergence along poorly determined directions.
 const FIRST_DAMPING: f64 = 1e-5;
 const LARGEST_RELIEF: f64 = 0.01;
 /// Damping at which no further try makes sense.
@@ -71,7 +71,7 @@ pub(super) fn iterate(engine: &mut dyn Engine, options: &Options, samples: usize
         let small_step = largest < options.step_tolerance;
         // Linearising costs little more than the cost alone, and most trials are accepted.
         let Some(trial) = engine.attempt().filter(|trial| *trial < cost) else {
-            // Rounding: nothing left to gain although the model promises a trace.
+            // Rounding: the promised decrease is below what the cost can resolve.
             if small_step || predicted <= 1e-9 * cost.max(floor) {
                 break Ending::ConvergedStep;
             }

@@ -1,4 +1,4 @@
-//! The engine for what lanes do not know, circles and fisheyes: view by view.
+//! The engine for circles and fisheyes, which have no batched one: view by view.
 
 use nalgebra::{DMatrix, Matrix6, SMatrix, SVector, Vector6};
 

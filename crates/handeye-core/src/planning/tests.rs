@@ -17,7 +17,7 @@ fn pool(seed: u64, size: usize) -> (DMatrix<f64>, Vec<DMatrix<f64>>) {
         y: cell.y,
         features: &cell.features,
         pixel_sigma: 0.2,
-        robot: None,
+        robot: crate::information::RobotError::default(),
         pixel_parameters: None,
         kinematic_count: 0,
         visibility: Visibility { image: None, margin_px: 0.0, fewest: 1 },

@@ -1,4 +1,4 @@
-//! One double: formulas that are written over [`Simd`] serve single values as well.
+//! One double: formulas written over [`Simd`] serve single values too.
 //!
 //! A fused product would be a library call on a machine without the instruction, so products round here.
 

@@ -21,7 +21,7 @@ from handeye.datasets.toml_reading import parse_toml
 from handeye.errors import InputError
 from handeye.types import Camera
 
-MAX_BYTES = 4 * MIB
+MAX_BYTES = 2 * MIB
 # The first that recognises a document reads it: those whose keys say more come first.
 FORMATS: tuple[CameraFormat, ...] = (
     visp.FORMAT,

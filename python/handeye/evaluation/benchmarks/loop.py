@@ -22,9 +22,11 @@ from handeye.planning.constraints import ViewConstraints
 from handeye.planning.feasibility import Generator as CandidateGenerator
 from handeye.robots import Arm
 from handeye.session import attempt, choosing, loop, taking
-from handeye.session.configuration import Collisions, Configuration, begin, prepare
+from handeye.session.calls import Calls
+from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import Step
 from handeye.session.entry import Entry
+from handeye.session.settings import Collisions, Configuration
 from handeye.session.store import SessionStore
 from handeye.solving import Estimate, Estimator, Measurements
 
@@ -34,7 +36,7 @@ CELL = "robot and camera, simulated"
 REST = "the rest"
 # What belongs to which stage; the names are looked up where they are called.
 _STAGES: tuple[tuple[str, object, str], ...] = (
-    (CELL, attempt, "within"),
+    (CELL, Calls, "run"),
     ("detection", attempt, "detect"),
     ("judging the view", taking, "objection"),
     ("judging the view", taking, "labeled"),

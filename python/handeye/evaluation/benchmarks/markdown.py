@@ -83,7 +83,6 @@ def _step(found: Mapping[str, Any]) -> list[str]:
     without = (_number(case["total_without_certificate_ms"]) for case in cases.values())
     rows.append(["sum without the certificate", *without])
     rows.append(["parameters", *(str(case["parameters"]) for case in cases.values())])
-    rows.append(["hypotheses averaged", *(str(case["hypotheses_averaged"]) for case in cases.values())])
     views, count = (next(iter(cases.values()))[what] for what in ("views", "candidates"))
     return [
         "## A planning step",

@@ -71,8 +71,7 @@ def predictor_of(
         cell.X,
         cell.Y,
         pixel_sigma=SIGMA_PX,
-        robot_side="left" if noise_aware else None,
-        robot_root=ROBOT_ROOT if noise_aware else None,
+        robot_left=ROBOT_ROOT if noise_aware else None,
         free_camera=list(range(free)) or None,
         image_size=SIZE_PX if sight else None,
     )

@@ -16,7 +16,8 @@ from handeye.evaluation.benchmarks.options import Options
 from handeye.evaluation.benchmarks.timing import interleave
 from handeye.evaluation.parallel import Progress
 from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate, simulated_arm
-from handeye.solving import Estimate, Measurements, Sight, make_estimator
+from handeye.planning.prediction import Prediction, Sight
+from handeye.solving import Estimate, Measurements, make_estimator
 from handeye.types import Camera, Recording, View
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
@@ -84,7 +85,6 @@ def _case(model: ModelName, lens: str, count: int, options: Options) -> dict[str
     timings = interleave(stages, budget)
     return {
         "parameters": len(estimate.covariance),
-        "hypotheses_averaged": len(estimate.averaged),
         "candidates_in_sight": int(np.isfinite(step.gains).sum()),
         "stages": {name: timing.to_dict() for name, timing in timings.items()},
         "total_ms": 1e3 * sum(timing.median_s for timing in timings.values()),
@@ -120,12 +120,12 @@ def _motions(joints: FloatArray) -> FloatArray:
 
 
 def _gains(estimate: Estimate, motions: FloatArray) -> FloatArray:
-    return estimate.gains(_core.Criterion("entropy"), motions, Sight())
+    return Prediction(estimate, Sight()).gains(_core.Criterion("entropy"), motions)
 
 
 def _certify(step: _Step) -> tuple[float, float, float]:
-    hypothesis = step.estimate.hypotheses[0]
+    prediction = Prediction(step.estimate, Sight())
     best = np.argsort(-np.nan_to_num(step.gains, nan=-np.inf), kind="stable")[:CERTIFIED_OF]
-    informations = step.estimate.predictor(hypothesis, Sight()).informations(step.motions[best])
-    chosen, _ = _core.select_views(hypothesis.information, informations, CERTIFIED, "entropy")
-    return _core.certify_views(hypothesis.information, informations, chosen, "entropy")
+    informations = prediction.informations(step.motions[best])
+    chosen, _ = _core.select_views(step.estimate.information, informations, CERTIFIED, "entropy")
+    return _core.certify_views(step.estimate.information, informations, chosen, "entropy")

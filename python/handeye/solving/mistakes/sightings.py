@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from handeye import _core
-from handeye.solving.auto import camera_prior
+from handeye.solving.camera_prior import camera_prior
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.mounting import Mounting
@@ -63,6 +63,7 @@ class Sightings:
         """Take the sightings of measurements."""
         variances = pixel_variances(measurements)
         prior = camera_prior(measurements.camera)
+        measurements = measurements.with_camera(prior.camera)
         free = list(prior.free)
         covariances: list[FloatArray] = []
         sensitivities: list[FloatArray] = []

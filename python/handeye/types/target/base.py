@@ -2,15 +2,16 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import MISSING, Field, fields, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.plain import read_document, without_none
+from handeye.types.target.artwork import Artwork
 from handeye.types.target.symmetry import Turn, turns_onto_itself
 
 MAX_POINTS = 100_000
@@ -23,21 +24,70 @@ class Target(ABC):
     rows downwards as one looks at its front, so z points into the board and its front faces -z, as usual
     with OpenCV.
 
-    A member of the family is a frozen dataclass with the measures of the board as its fields.
+    A member of the family is a frozen dataclass with the measures of the board as its fields. What few
+    boards have is a keyword-only field; files hold it only where it is not the usual.
     """
 
     family: ClassVar[str]
     """Name of the family, as in files."""
 
-    _members: ClassVar[dict[str, type["Target"]]] = {}
+    scale: ClassVar[str]
+    """The field, a length in metres, that all other lengths usually follow."""
+
+    usual_measures: ClassVar[Mapping[str, Any]]
+    """The other fields of a usual board; lengths (`_m`) as shares of the scale."""
+
+    members: ClassVar[dict[str, type["Target"]]] = {}
+    """Every family by its name."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:  # noqa: ANN401 - passed on as it is
         super().__init_subclass__(**kwargs)
-        Target._members[cls.family] = cls
+        if "family" in vars(cls):
+            Target.members[cls.family] = cls
 
     @abstractmethod
     def _layout(self) -> FloatArray:
         """Return the points (P, 2) in the plane of the board, in metres."""
+
+    @abstractmethod
+    def artwork(self) -> Artwork:
+        """Return what is printed on the board."""
+
+    @property
+    @abstractmethod
+    def caption(self) -> str:
+        """The board in one line, for a person."""
+
+    @property
+    @abstractmethod
+    def spacing_m(self) -> float:
+        """Distance of what is repeated on the board: squares, circles, or markers."""
+
+    @classmethod
+    def usual(cls, scale_m: float, asked: Mapping[str, Any]) -> Self:
+        """Return a board with the measures that are asked for, and usual ones else.
+
+        Raises
+        ------
+        InputError
+            A measure out of its range.
+        """
+        shares = {
+            name: round(value * scale_m, 9) if name.endswith("_m") else value
+            for name, value in cls.usual_measures.items()
+        }
+        return cls(**{cls.scale: scale_m, **shares, **asked})
+
+    @classmethod
+    def fields(cls) -> tuple[str, ...]:
+        """Return the names of the fields."""
+        return tuple(field.name for field in cls._described())
+
+    @classmethod
+    def _described(cls) -> "list[Field[Any]]":
+        """Return the fields as they are in files: those of every board of the family first."""
+        every: tuple[Field[Any], ...] = fields(cast("Any", cls))
+        return sorted(every, key=lambda field: bool(field.kw_only))
 
     def _looks_the_same(self, turn: Turn) -> bool:
         """Tell whether the picture of the board, not only its points, is the same after a turn."""
@@ -86,10 +136,41 @@ class Target(ABC):
         """
         return tuple(turn.permutation for turn in self.turns if self._looks_the_same(turn))
 
+    def changed(self, **measures: Any) -> Self:  # noqa: ANN401 - of any family
+        """Return the board with other measures.
+
+        Raises
+        ------
+        InputError
+            A measure out of its range.
+        """
+        return cast("Self", replace(cast("Any", self), **measures))
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON or TOML; `Target.from_dict` reads them back."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}  # pyright: ignore[reportArgumentType]
+        values: dict[str, Any] = {}
+        for field in self._described():
+            value = getattr(self, field.name)
+            if not (field.kw_only and field.default is not MISSING and value == field.default):
+                values[field.name] = [*cast("tuple[int, ...]", value)] if isinstance(value, tuple) else value
         return {"family": self.family, **without_none(**values)}
+
+    @staticmethod
+    def member(family: object) -> type["Target"]:
+        """Return the family of a name.
+
+        Raises
+        ------
+        InputError
+            No such family.
+        """
+        member = Target.members.get(family) if isinstance(family, str) else None
+        if member is None:
+            raise InputError(
+                f"target: family {family!r}, expected one of {', '.join(sorted(Target.members))}",
+                code="unknown_target",
+            )
+        return member
 
     @staticmethod
     def from_dict(data: object) -> "Target":
@@ -102,13 +183,8 @@ class Target(ABC):
         """
         table = dict(read_document(data, Mapping[str, Any], "target"))
         family = table.pop("family", None)
-        member = Target._members.get(family) if isinstance(family, str) else None
-        if member is None:
-            raise InputError(
-                f"target: family {family!r}, expected one of {', '.join(sorted(Target._members))}",
-                code="unknown_target",
-            )
-        names = [field.name for field in fields(member)]  # pyright: ignore[reportArgumentType]
+        member = Target.member(family)
+        names = member.fields()
         unknown = sorted(set(table) - set(names))
         if unknown:
             raise InputError(
@@ -116,6 +192,11 @@ class Target(ABC):
                 code="invalid_field",
             )
         return read_document(table, member, f"target: {family}")
+
+
+def mm(metres: float) -> str:
+    """Return a length in millimetres with as many digits as it has, up to a nanometre."""
+    return f"{round(metres * 1000, 6):.10g} mm"
 
 
 def check_point_count(points: int, what: str) -> None:

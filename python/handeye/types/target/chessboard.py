@@ -1,10 +1,14 @@
 """The chessboard."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from handeye.types.arrays import FloatArray, count, positive
-from handeye.types.target.base import Target, check_point_count, grid
+from handeye.types.target.artwork import Artwork, Squares, chequered
+from handeye.types.target.base import Target, check_point_count, grid, mm
 from handeye.types.target.symmetry import Turn
 
 
@@ -27,6 +31,9 @@ class Chessboard(Target):
     """
 
     family: ClassVar[str] = "chessboard"
+    scale: ClassVar[str] = "pitch_m"
+    # An even and an odd number of corners, so that it has no symmetry.
+    usual_measures: ClassVar[Mapping[str, Any]] = {"rows": 7, "columns": 10}
 
     rows: int
     columns: int
@@ -40,6 +47,25 @@ class Chessboard(Target):
 
     def _layout(self) -> FloatArray:
         return grid(self.rows, self.columns, self.pitch_m)
+
+    def artwork(self) -> Artwork:
+        """Return the squares, dark at the upper left as OpenCV draws them; the origin is one square in."""
+        dark = chequered(self.rows + 1, self.columns + 1, 0)
+        squares = Squares(np.full(2, -self.pitch_m), self.pitch_m, self.pitch_m, dark)
+        return Artwork((squares,), self.pitch_m / 4)
+
+    @property
+    def caption(self) -> str:
+        """The board in one line."""
+        return (
+            f"Chessboard, {self.rows} x {self.columns} inner corners "
+            f"({self.rows + 1} x {self.columns + 1} squares), side of a square {mm(self.pitch_m)}"
+        )
+
+    @property
+    def spacing_m(self) -> float:
+        """Side of a square."""
+        return self.pitch_m
 
     def _looks_the_same(self, turn: Turn) -> bool:
         """Tell whether colours fall on colours.

@@ -1,14 +1,19 @@
 """The grid of circles."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, count, positive
-from handeye.types.target.base import Target, check_point_count, grid
+from handeye.types.target.artwork import Artwork, Discs
+from handeye.types.target.base import Target, check_point_count, grid, mm
 from handeye.types.target.symmetry import Turn
+
+# How much larger a marked circle usually is.
+MARKED_RATIO = 1.4
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,8 @@ class CircleGrid(Target):
     """
 
     family: ClassVar[str] = "circle_grid"
+    scale: ClassVar[str] = "pitch_m"
+    usual_measures: ClassVar[Mapping[str, Any]] = {"rows": 7, "columns": 10, "diameter_m": 0.5}
 
     rows: int
     columns: int
@@ -86,6 +93,44 @@ class CircleGrid(Target):
             return grid(self.rows, self.columns, self.pitch_m)
         row, column = np.divmod(np.arange(self.rows * self.columns), self.columns)
         return np.column_stack([2 * column + row % 2, row]) * self.pitch_m
+
+    @classmethod
+    def usual(cls, scale_m: float, asked: Mapping[str, Any]) -> Self:
+        """Return a grid; one of eleven shifted rows of four has no symmetry."""
+        shape = {"rows": 11, "columns": 4} if asked.get("asymmetric") else {}
+        grid = super().usual(scale_m, {**shape, **asked})
+        if grid.marked is None or grid.marked_diameter_m is not None:
+            return grid
+        larger = round(MARKED_RATIO * grid.diameter_m, 9)
+        return super().usual(scale_m, {**shape, **asked, "marked_diameter_m": larger})
+
+    def artwork(self) -> Artwork:
+        """Return the circles."""
+        if not self.asymmetric:
+            radii = self.radii_m.reshape(self.rows, self.columns)
+        else:
+            row, column = np.divmod(np.arange(self.point_count), self.columns)
+            radii = np.zeros((self.rows, 2 * self.columns))
+            radii[row, 2 * column + row % 2] = self.radii_m
+        return Artwork((Discs(self.pitch_m, radii),), self.pitch_m / 4)
+
+    @property
+    def caption(self) -> str:
+        """The grid in one line."""
+        kind = "Asymmetric circle grid" if self.asymmetric else "Circle grid"
+        text = (
+            f"{kind}, {self.rows} rows x {self.columns} columns, pitch {mm(self.pitch_m)}, "
+            f"diameter {mm(self.diameter_m)}"
+        )
+        if self.marked is None:
+            return text
+        size = "" if self.marked_diameter_m is None else f": {mm(self.marked_diameter_m)}"
+        return f"{text}, circle {self.marked} larger{size}"
+
+    @property
+    def spacing_m(self) -> float:
+        """Distance of neighbouring rows."""
+        return self.pitch_m
 
     def _looks_the_same(self, turn: Turn) -> bool:
         """Tell whether the marked circle stays where it is; without one, points are all there is to see.

@@ -31,6 +31,21 @@ DICTIONARIES: dict[str, int] = {
 }
 
 
+# Bits along a side, where the name does not begin with them.
+_OTHER_BITS = {"ORIGINAL": 5, "16h5": 4, "25h9": 5, "36h10": 6, "36h11": 6, "36h12": 6}
+
+
+def marker_count(name: str) -> int:
+    """Return the number of markers of a dictionary."""
+    return DICTIONARIES[name]
+
+
+def marker_bits(name: str) -> int:
+    """Return the number of bits along a side of the markers of a dictionary, its border apart."""
+    kind, last = name.split("_")[1], name.rsplit("_", 1)[-1]
+    return int(kind[0]) if "X" in kind else _OTHER_BITS[last]
+
+
 def check_dictionary(name: str, markers: int, what: str) -> None:
     """Check that a dictionary is one of OpenCV's and has enough markers.
 

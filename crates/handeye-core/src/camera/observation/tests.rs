@@ -26,12 +26,11 @@ fn integrated(camera: &Camera, t: &Se3, feature: &Feature) -> Option<Vector2<f64
         for sector in 0..SECTORS {
             let angle = std::f64::consts::TAU * sector as f64 / SECTORS as f64;
             let offset = Vector3::new(radius * angle.cos(), radius * angle.sin(), 0.0);
-            let (pixel, d_point) =
-                camera.project_with_point_derivative(&t.act(&(feature.position + offset)))?;
-            let along = d_point * t.rotation.fixed_columns::<2>(0);
+            let seen = camera.project_with_derivatives(&t.act(&(feature.position + offset)))?;
+            let along = seen.d_point * t.rotation.fixed_columns::<2>(0);
             let piece = along.determinant().abs() * weight;
             area += piece;
-            moment += pixel * piece;
+            moment += seen.pixel * piece;
         }
     }
     Some(moment / area)

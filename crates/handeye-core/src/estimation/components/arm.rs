@@ -36,9 +36,7 @@ impl Arm {
             let (Some(joints), Some(links)) = (&station.joints, &station.links) else {
                 return Err(Error::invalid(format!("station {k} has no joints, others have")));
             };
-            if joints.ncols() != n
-                || links.ncols() != ways
-                || assumptions.free_joints.iter().any(|j| *j >= n)
+            if joints.ncols() != n || links.ncols() != ways || assumptions.free_joints.iter().any(|j| *j >= n)
             {
                 return Err(Error::invalid(format!(
                     "station {k}: {} joints and {} ways of displacing them, expected {n} and {ways}",

@@ -1,6 +1,5 @@
 //! Boards that are larger or smaller than stated: printers and rulers.
 
-use crate::estimation::tuning::tune;
 use nalgebra::{DMatrix, DVector};
 
 use super::Component;
@@ -21,7 +20,7 @@ impl Component for BoardScale {
         vec![Level {
             name: "board_scale",
             start: 1e-4,
-            prior: LevelPrior::Deviation { size: tune(12, 1e-3), exponent: tune(13, 0.1), nothing: 1e-6 },
+            prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.1, nothing: 1e-6 },
         }]
     }
 

@@ -1,6 +1,5 @@
 //! A camera that is known from a calibration, and perhaps less well than that says.
 
-use crate::estimation::tuning::tune;
 use super::Component;
 use crate::estimation::cell::{CameraPrior, Cell};
 use crate::estimation::levels::{Level, LevelPrior};
@@ -28,7 +27,7 @@ impl Component for CameraCovariance {
     }
 
     fn levels(&self) -> Vec<Level> {
-        let spread = if self.prior.inflated { tune(11, 0.5) } else { 1e-3 };
+        let spread = if self.prior.inflated { 0.5 } else { 1e-3 };
         let start = if self.prior.inflated { USUAL_INFLATION } else { 1.0 };
         vec![Level { name: "camera_inflation", start, prior: LevelPrior::Ratio { spread } }]
     }

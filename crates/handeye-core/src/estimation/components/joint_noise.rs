@@ -1,6 +1,5 @@
 //! Each joint off by an error of its own at every station: encoders, play.
 
-use crate::estimation::tuning::tune;
 use nalgebra::DMatrix;
 
 use super::{Arm, Component, per_station};
@@ -30,7 +29,7 @@ impl Component for JointNoise {
         vec![Level {
             name: "joint_rad",
             start: 0.004 * degree,
-            prior: LevelPrior::Deviation { size: tune(3, 0.02) * degree, exponent: tune(4, 0.02), nothing: 1e-4 * degree },
+            prior: LevelPrior::Deviation { size: 0.02 * degree, exponent: 0.05, nothing: 1e-4 * degree },
         }]
     }
 

@@ -1,6 +1,5 @@
 //! Joints that stand beyond where they are read, always by the same.
 
-use crate::estimation::tuning::tune;
 use nalgebra::DMatrix;
 
 use super::{Arm, Component, per_station};
@@ -30,7 +29,7 @@ impl Component for JointOffsets {
         vec![Level {
             name: "offset_rad",
             start: 0.01 * degree,
-            prior: LevelPrior::Deviation { size: tune(5, 0.05) * degree, exponent: tune(6, 0.02), nothing: 1e-4 * degree },
+            prior: LevelPrior::Deviation { size: 0.05 * degree, exponent: 0.1, nothing: 1e-4 * degree },
         }]
     }
 

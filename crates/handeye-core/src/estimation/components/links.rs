@@ -1,6 +1,5 @@
 //! Joints that sit a little beside where the description has them on the link before: displaced, or tilted.
 
-use crate::estimation::tuning::tune;
 use nalgebra::DMatrix;
 
 use super::{Arm, Component, per_station};
@@ -32,12 +31,12 @@ impl Component for Links {
             Level {
                 name: "link_m",
                 start: 1e-4,
-                prior: LevelPrior::Deviation { size: tune(7, 5e-4), exponent: tune(8, 0.02), nothing: 1e-6 },
+                prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.1, nothing: 1e-6 },
             },
             Level {
                 name: "link_rad",
                 start: 0.005 * degree,
-                prior: LevelPrior::Deviation { size: tune(9, 0.03) * degree, exponent: tune(10, 0.02), nothing: 1e-4 * degree },
+                prior: LevelPrior::Deviation { size: 0.03 * degree, exponent: 0.05, nothing: 1e-4 * degree },
             },
         ]
     }

@@ -8,6 +8,7 @@ mod joint_offsets;
 mod links;
 mod posture;
 mod robot_pose;
+mod time_lag;
 
 use nalgebra::DMatrix;
 
@@ -62,6 +63,9 @@ pub(super) fn all(cell: &Cell, assumptions: &Assumptions) -> Result<Vec<Box<dyn 
     }
     all.push(Box::new(robot_pose::RobotPose::flange()));
     all.push(Box::new(robot_pose::RobotPose::base()));
+    if let Some(lag) = time_lag::TimeLag::of(cell) {
+        all.push(Box::new(lag));
+    }
     if let Some(arm) = Arm::of(cell, assumptions)? {
         all.push(Box::new(joint_noise::JointNoise::new(&arm)));
         all.push(Box::new(joint_offsets::JointOffsets::new(&arm)));
@@ -71,6 +75,11 @@ pub(super) fn all(cell: &Cell, assumptions: &Assumptions) -> Result<Vec<Box<dyn 
         all.push(Box::new(posture::Posture::base(cell)));
     }
     Ok(all)
+}
+
+/// Whether a component is an error of the robot.
+pub(super) fn is_of_robot(name: &str) -> bool {
+    !matches!(name, "camera" | "board_scale" | "time_lag")
 }
 
 /// A matrix per station: rows of a twist at the flange or base times columns of such twists.

@@ -5,7 +5,6 @@
 //! posture whose coefficients are twists (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2006,
 //! section 2.2).
 
-use crate::estimation::tuning::tune;
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::{Component, per_station};
@@ -17,8 +16,22 @@ use crate::estimation::mixed::{Effect, Term};
 /// Flange poses further apart than this have little of an error in common; a chord of 2 is half a turn.
 const LIKENESS_M: f64 = 1.0;
 const LIKENESS_CHORD: f64 = 2.0;
-/// Share of the variance that no posture changes: a base or flange that is turned in itself.
-const SAME_EVERYWHERE: f64 = 0.5;
+/// What is believed of an error on one side: it hides in X and Y, where no residual shows it, so more is believed of it
+/// than of what residuals show.
+struct Beliefs {
+    /// Share of the variance that no posture changes: a base or flange that is turned in itself.
+    same_everywhere: f64,
+    /// See [`LevelPrior::Deviation`], degrees.
+    size_deg: f64,
+    exponent: f64,
+    /// Lever that turns the rotation into a translation, metres.
+    lever_m: f64,
+}
+
+/// Wrists are short, and what they hide is small.
+const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.2, lever_m: 0.4 };
+/// Shoulders and mountings carry the whole reach.
+const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.4, lever_m: 1.0 };
 /// Functions that carry less of the variance than this count as each station's own.
 const SMALLEST_FUNCTION: f64 = 0.01;
 /// Share of the variance that is always each station's own.
@@ -27,7 +40,7 @@ const OWN_SHARE: f64 = 1e-3;
 /// A smooth error at the flange or at the base.
 pub(in crate::estimation) struct Posture {
     name: &'static str,
-    side: usize,
+    beliefs: &'static Beliefs,
     levels: [&'static str; 2],
     rows: fn(&Rows) -> &DMatrix<f64>,
     /// Value of each function (columns) at each station of the cell (rows).
@@ -39,44 +52,51 @@ pub(in crate::estimation) struct Posture {
 impl Posture {
     /// At the flange.
     pub fn flange(cell: &Cell) -> Self {
-        Self::new(cell, "posture_flange", ["posture_flange_rad", "posture_flange_lever_m"], 0, |rows| &rows.flange)
+        Self::new(
+            cell,
+            "posture_flange",
+            ["posture_flange_rad", "posture_flange_lever_m"],
+            &AT_FLANGE,
+            |rows| &rows.flange,
+        )
     }
 
     /// At the base.
     pub fn base(cell: &Cell) -> Self {
-        Self::new(cell, "posture_base", ["posture_base_rad", "posture_base_lever_m"], 1, |rows| &rows.base)
+        Self::new(cell, "posture_base", ["posture_base_rad", "posture_base_lever_m"], &AT_BASE, |rows| {
+            &rows.base
+        })
     }
 
     fn new(
         cell: &Cell,
         name: &'static str,
         levels: [&'static str; 2],
-        side: usize,
+        beliefs: &'static Beliefs,
         rows: fn(&Rows) -> &DMatrix<f64>,
     ) -> Self {
-        let eigen = SymmetricEigen::new(likeness(cell, side));
+        let eigen = SymmetricEigen::new(likeness(cell, beliefs.same_everywhere));
         let count = cell.stations.len();
         let least = SMALLEST_FUNCTION * count as f64;
         let kept: Vec<usize> = (0..count).filter(|i| eigen.eigenvalues[*i] > least.min(0.5)).collect();
         let functions = DMatrix::from_fn(count, kept.len(), |k, j| {
             eigen.eigenvectors[(k, kept[j])] * (eigen.eigenvalues[kept[j]] * (1.0 - OWN_SHARE)).sqrt()
         });
-        let own =
-            (0..count).map(|k| (1.0 - functions.row(k).norm_squared()).max(OWN_SHARE).sqrt()).collect();
-        Self { name, side, levels, rows, functions, own }
+        let own = (0..count).map(|k| (1.0 - functions.row(k).norm_squared()).max(OWN_SHARE).sqrt()).collect();
+        Self { name, beliefs, levels, rows, functions, own }
     }
 }
 
 /// How far a smooth error is the same at two stations.
-fn likeness(cell: &Cell, side: usize) -> DMatrix<f64> {
+fn likeness(cell: &Cell, same: f64) -> DMatrix<f64> {
     let count = cell.stations.len();
     DMatrix::from_fn(count, count, |i, j| {
         let (a, b) = (&cell.stations[i].pose, &cell.stations[j].pose);
-        let metres = (a.translation - b.translation).norm() / tune(16, LIKENESS_M);
+        let metres = (a.translation - b.translation).norm() / LIKENESS_M;
         // 2 sin(angle / 2); of the angle itself it would be no correlation.
-        let chord = (3.0 - a.rotation.dot(&b.rotation)).max(0.0).sqrt() / tune(17, LIKENESS_CHORD);
+        let chord = (3.0 - a.rotation.dot(&b.rotation)).max(0.0).sqrt() / LIKENESS_CHORD;
         let alike = if i == j { 1.0 } else { (-0.5 * (metres * metres + chord * chord)).exp() };
-        tune(14 + side, SAME_EVERYWHERE) + (1.0 - tune(14 + side, SAME_EVERYWHERE)) * alike
+        same + (1.0 - same) * alike
     })
 }
 
@@ -91,14 +111,17 @@ impl Component for Posture {
             Level {
                 name: self.levels[0],
                 start: 0.006 * degree,
-                // It hides in X and Y, where no residual shows it: more is believed of it than of the others.
                 prior: LevelPrior::Deviation {
-                    size: tune(18 + self.side, 0.02) * degree,
-                    exponent: tune(20 + self.side, 0.5),
+                    size: self.beliefs.size_deg * degree,
+                    exponent: self.beliefs.exponent,
                     nothing: 1e-4 * degree,
                 },
             },
-            Level { name: self.levels[1], start: tune(22 + self.side, 1.0), prior: LevelPrior::Ratio { spread: tune(24 + self.side, 0.7) } },
+            Level {
+                name: self.levels[1],
+                start: self.beliefs.lever_m,
+                prior: LevelPrior::Ratio { spread: 0.7 },
+            },
         ]
     }
 

@@ -1,6 +1,5 @@
 //! Each reported pose off by a twist of its own, at the flange or at the base.
 
-use crate::estimation::tuning::tune;
 use nalgebra::DMatrix;
 
 use super::{Component, per_station};
@@ -39,13 +38,9 @@ impl Component for RobotPose {
             Level {
                 name: self.levels[0],
                 start: 0.004 * degree,
-                prior: LevelPrior::Deviation {
-                    size: tune(0, 0.02) * degree,
-                    exponent: tune(1, 0.02),
-                    nothing: 1e-4 * degree,
-                },
+                prior: LevelPrior::Deviation { size: 0.02 * degree, exponent: 0.02, nothing: 1e-4 * degree },
             },
-            Level { name: self.levels[1], start: 1.0, prior: LevelPrior::Ratio { spread: tune(2, 0.7) } },
+            Level { name: self.levels[1], start: 1.0, prior: LevelPrior::Ratio { spread: 0.7 } },
         ]
     }
 

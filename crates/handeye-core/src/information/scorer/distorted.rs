@@ -1,14 +1,10 @@
 //! The information of corners seen through a Brown-Conrady lens, lanes = candidates.
-//!
-//! With the lens' Jacobian `J` at unit depth, a row of `d pi / d eta` with entries `(A, B)` of `F J` is
-//! `[A w, B w, -s w, -(y s + B), A + x s, B x - A y]`, `s = x A + y B`.
 
 use super::block::{BLOCK, Block};
 use super::target::{Target, Way, advance};
 use super::window::Window;
 use crate::batched_algebra::{UPPER, load, store, upper};
-use crate::camera::distort;
-use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M};
+use crate::camera::{MAX_PARAMETERS, MIN_DEPTH_M, distort, projection_row, restore_signs};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// Sums the information, divided by `f_x^2`, of the points in sight, and counts them.
@@ -70,10 +66,8 @@ fn sum<S: Simd, const RATIONAL: bool, const PRISM: bool>(
                         (distorted.along_y * aspect).keep(in_sight),
                     ),
                 ];
-                for (a, b) in rows {
-                    let s = a.mul_add(x, b * y);
-                    // Third and fourth entry with the opposite sign, put right at the end.
-                    let row = [a * w, b * w, s * w, y.mul_add(s, b), x.mul_add(s, a), b.mul_add(x, -(a * y))];
+                for of_lens in rows {
+                    let row = projection_row(of_lens, w, x, y);
                     for i in 0..6 {
                         for j in i..6 {
                             sums[upper(i, j)] = row[i].mul_add(row[j], sums[upper(i, j)]);
@@ -85,10 +79,6 @@ fn sum<S: Simd, const RATIONAL: bool, const PRISM: bool>(
             advance(&mut line, &way.next_line);
         }
     }
-    for i in [2, 3] {
-        for j in [0, 1, 4, 5] {
-            sums[upper(i, j)] = -sums[upper(i, j)];
-        }
-    }
+    restore_signs(&mut sums);
     (sums, seen)
 }

@@ -17,8 +17,8 @@ use nalgebra::{DMatrix, Matrix6};
 
 use crate::error::Error;
 use crate::information::belief::{Belief, CHAIN, invert};
+use crate::information::candidate::RobotError;
 use crate::information::criteria::EntropyOf;
-use crate::least_squares::Side;
 use crate::se3::Se3;
 
 /// Where entry `(i, j)`, `i <= j`, of a symmetric matrix of `size` rows lies in its upper triangle, row by row.
@@ -67,11 +67,10 @@ struct RobotNoise {
 }
 
 impl RobotNoise {
-    fn new(x: &Se3, robot: Option<&(Side, Matrix6<f64>)>) -> Self {
-        match robot {
-            None => Self { left: Matrix6::zeros(), right: None },
-            Some((Side::Left, root)) => Self { left: square(&(x.adjoint() * root)), right: None },
-            Some((Side::Right, root)) => Self { left: Matrix6::zeros(), right: Some(*root) },
+    fn new(x: &Se3, robot: &RobotError) -> Self {
+        Self {
+            left: robot.left.map_or_else(Matrix6::zeros, |root| square(&(x.adjoint() * root))),
+            right: robot.right,
         }
     }
 
@@ -92,14 +91,14 @@ impl Entropies {
         of: EntropyOf,
         pixel_parameters: usize,
         x: &Se3,
-        robot: Option<&(Side, Matrix6<f64>)>,
+        robot: &RobotError,
     ) -> Result<Self, Error> {
         let size = 6 + pixel_parameters;
         let noise = RobotNoise::new(x, robot);
-        let without = match (of, robot) {
-            (EntropyOf::Everything, None) => None,
+        let without = match (of, robot.is_none()) {
+            (EntropyOf::Everything, true) => None,
             // The robot's error moves the twist alone.
-            (EntropyOf::Everything, Some(_)) => Some(noise.form(6)),
+            (EntropyOf::Everything, false) => Some(noise.form(6)),
             (EntropyOf::HandEye, _) => {
                 let (nuisance, _) = belief
                     .nuisance()
@@ -121,7 +120,7 @@ pub(super) fn predicted(
     belief: &Belief,
     pixel_parameters: usize,
     x: &Se3,
-    robot: Option<&(Side, Matrix6<f64>)>,
+    robot: &RobotError,
 ) -> Result<Form, Error> {
     let singular = || Error::degenerate("the covariance of the target's pose is singular");
     let noise = RobotNoise::new(x, robot);
@@ -262,6 +261,6 @@ impl Observed {
 }
 
 /// What the robot's error alone makes of a view.
-pub(super) fn robot_only(pixel_parameters: usize, x: &Se3, robot: Option<&(Side, Matrix6<f64>)>) -> Form {
+pub(super) fn robot_only(pixel_parameters: usize, x: &Se3, robot: &RobotError) -> Form {
     RobotNoise::new(x, robot).form(6 + pixel_parameters)
 }

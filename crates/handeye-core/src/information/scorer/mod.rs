@@ -33,12 +33,12 @@ use self::wide_algebra::{Outcome, Wide};
 use self::wide_points::{Column, WidePoints};
 use self::window::Window;
 use super::belief::Belief;
-use super::candidate::{CandidateModel, Execution, Motions, Sums};
+use super::candidate::{CandidateModel, Execution, Motions, RobotError, Sums};
 use super::criteria::{Gain, Quantity};
 use crate::batched_algebra::{UPPER, upper};
 use crate::camera::{Camera, Lens};
 use crate::error::Error;
-use crate::least_squares::{PixelParameters, Side};
+use crate::least_squares::PixelParameters;
 use crate::se3::Se3;
 use crate::se3::entries;
 use crate::simd::{VectorUnit, dispatch};
@@ -84,7 +84,7 @@ impl<'a> Scorer<'a> {
         &mut self,
         weight: f64,
         belief: &'a Belief,
-        robot: Option<&(Side, Matrix6<f64>)>,
+        robot: &RobotError,
         quantity: &Quantity,
         gain: Box<dyn Gain + 'a>,
     ) -> Result<(), Error> {

@@ -47,7 +47,7 @@ struct Scene {
     x: Se3,
     y: Se3,
     features: Vec<Feature>,
-    robot: Option<(Side, Matrix6<f64>)>,
+    robot: RobotError,
     pixel_parameters: Option<PixelParameters>,
     kinematic_count: usize,
     visibility: Visibility,
@@ -83,7 +83,7 @@ impl Scene {
             x,
             y,
             features,
-            robot: None,
+            robot: RobotError::default(),
             pixel_parameters: None,
             kinematic_count: 0,
             visibility,
@@ -198,8 +198,8 @@ proptest! {
         let mut scene = Scene::new(random, lens, count, scattered, 0.0);
         scene.robot = match noisy {
             0 => None,
-            1 => Some((Side::Left, robot_root(random))),
-            _ => Some((Side::Right, robot_root(random))),
+            1 => RobotError::on_left(robot_root(random)),
+            _ => RobotError::on_right(robot_root(random)),
         };
         scene.visibility.fewest = fewest;
         // Few points may lie on one line, whose information is singular but for rounding.
@@ -248,8 +248,8 @@ proptest! {
         let mut scene = Scene::new(random, lens, 37, false, radius);
         scene.robot = match noisy {
             0 => None,
-            1 => Some((Side::Left, robot_root(random))),
-            _ => Some((Side::Right, robot_root(random))),
+            1 => RobotError::on_left(robot_root(random)),
+            _ => RobotError::on_right(robot_root(random)),
         };
         let camera: Vec<usize> = (0..lens.parameter_count()).filter(|i| free[*i]).collect();
         let count = camera.len() + usize::from(board_scale);
@@ -275,7 +275,7 @@ fn moments_of_a_plane_serve_the_camera_too() {
     {
         let random = &mut Random::new(20 + seed as u64);
         let mut scene = Scene::new(random, Lens::Pinhole, 90, seed % 2 == 1, 0.0);
-        scene.robot = (seed > 1).then(|| (Side::Right, robot_root(random)));
+        scene.robot = if seed > 1 { RobotError::on_right(robot_root(random)) } else { RobotError::default() };
         scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false });
         scene.belief = scene.start();
         scene.visibility.fewest = 8;
@@ -323,9 +323,9 @@ fn a_mean_over_suppositions_is_the_mean_of_each() {
         }
         let wider = Belief::new(scene.belief.information() * 0.5).unwrap();
         let supposed = [
-            Supposition { weight: 0.5, belief: &scene.belief, robot: None },
-            Supposition { weight: 0.2, belief: &wider, robot: Some((Side::Left, robot_root(random))) },
-            Supposition { weight: 0.3, belief: &wider, robot: Some((Side::Right, robot_root(random))) },
+            Supposition { weight: 0.5, belief: &scene.belief, robot: RobotError::default() },
+            Supposition { weight: 0.2, belief: &wider, robot: RobotError::on_left(robot_root(random)) },
+            Supposition { weight: 0.3, belief: &wider, robot: RobotError::on_right(robot_root(random)) },
         ];
         let execution = Execution::default();
         let motions = Motions::Transforms(&scene.motions);
@@ -368,7 +368,7 @@ fn candidates_are_of_every_kind() {
 fn circles_go_feature_by_feature() {
     let mut scene = Scene::new(&mut Random::new(8), Lens::BrownConrady5, 45, false, 0.01);
     scene.check(&Entropy, 1e-10).unwrap();
-    scene.robot = Some((Side::Right, robot_root(&mut Random::new(1))));
+    scene.robot = RobotError::on_right(robot_root(&mut Random::new(1)));
     scene.check(&EntropyHandEye, 1e-10).unwrap();
 }
 

@@ -162,7 +162,7 @@ fn observe<S: Simd, const CAPACITY: usize>(
     }
 }
 
-/// The desk of a group of candidates.
+/// Working memory for a group of candidates.
 struct Work<V, const CAPACITY: usize, const PACKED: usize> {
     size: usize,
     /// Upper triangles, row by row.

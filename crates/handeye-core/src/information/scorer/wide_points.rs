@@ -5,7 +5,9 @@ use super::forms::packed;
 use super::target::{Patch, Target};
 use super::window::Window;
 use crate::batched_algebra::load;
-use crate::camera::{DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, coefficient_derivative, distort};
+use crate::camera::{
+    DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, coefficient_derivative, distort, projection_row,
+};
 use crate::simd::{Kernel, Simd, Vector};
 
 /// Points whose rows of `d pi / d [eta; c]` are squared together: a sum is fetched once for all of them.
@@ -131,15 +133,11 @@ impl<const DISTORTED: bool, const RATIONAL: bool, const PRISM: bool>
             (distorted.along_x.keep(in_sight), distorted.cross_x.keep(in_sight)),
             ((distorted.cross_y * aspect).keep(in_sight), (distorted.along_y * aspect).keep(in_sight)),
         ];
-        for (row, (a, b)) in jacobian.into_iter().enumerate() {
-            let s = a.mul_add(x, b * y);
-            let (aw, bw, sw) = (a * w, b * w, -(s * w));
-            rows[0][row][at] = aw;
-            rows[1][row][at] = bw;
-            rows[2][row][at] = sw;
-            rows[3][row][at] = -y.mul_add(s, b);
-            rows[4][row][at] = x.mul_add(s, a);
-            rows[5][row][at] = b.mul_add(x, -(a * y));
+        for (row, of_lens) in jacobian.into_iter().enumerate() {
+            let entries = projection_row(of_lens, w, x, y);
+            for (i, entry) in entries.into_iter().enumerate() {
+                rows[i][row][at] = if i == 2 || i == 3 { -entry } else { entry };
+            }
         }
         let inverse_focal = simd.splat(1.0 / p[0]);
         for (column, rows) in self.columns.iter().zip(&mut rows[6..]) {

@@ -1,12 +1,12 @@
 //! Residuals and their derivatives: the 6 x 6 information and gradient of each view, lanes = views.
 
 use crate::batched_algebra::{Sums, UPPER, load, store, upper};
-use crate::camera::{DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, distort};
+use crate::camera::{DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, distort, projection_row, restore_signs};
 use crate::least_squares::measurements::{Group, Measurements, Point, Row};
 use crate::se3::{left_product, right_product};
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector};
 
-/// What a group of views is found to be at one state.
+/// A group of views linearised at one state.
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct LinearisedGroup {
@@ -34,7 +34,7 @@ impl LinearisedGroup {
     }
 }
 
-/// The camera as the kernels want it.
+/// Camera parameters for the kernels.
 pub(super) struct Optics {
     pub parameters: [f64; MAX_PARAMETERS],
     pub max_squared_radius: f64,
@@ -85,11 +85,7 @@ impl<const DISTORTED: bool, const FULLY: bool> Kernel for Linearise<'_, DISTORTE
                     view.sums.information(simd, aspect * aspect, count)
                 };
                 if DISTORTED {
-                    for i in [2, 3] {
-                        for j in [0, 1, 4, 5] {
-                            information[upper(i, j)] = -information[upper(i, j)];
-                        }
-                    }
+                    restore_signs(&mut information);
                 }
                 for (sum, row) in information.iter().zip(&mut out.information) {
                     (*sum * weight).store(&mut row[at..]);
@@ -191,7 +187,7 @@ impl<const DISTORTED: bool, const FULLY: bool> How<'_, DISTORTED, FULLY> {
         let (a, b) = (distorted.along_x, distorted.cross_x);
         let (c, d) = (distorted.cross_y * view.aspect, distorted.along_y * view.aspect);
         v = v * view.aspect;
-        let mut rows = [row(a, b, w, x, y), row(c, d, w, x, y)];
+        let mut rows = [projection_row((a, b), w, x, y), projection_row((c, d), w, x, y)];
         view.squared = u.mul_add(u, v.mul_add(v, view.squared));
         if RAGGED {
             for row in &mut rows {
@@ -227,11 +223,4 @@ impl<V: Vector> View<V> {
         g[4] = x.mul_add(turn, g[4] + u);
         g[5] = y.neg_mul_add(u, x.mul_add(across, g[5]));
     }
-}
-
-/// A row of `d pi / d eta` from `(A, B)` of the lens, third and fourth entry with the opposite sign.
-#[inline(always)]
-fn row<V: Vector>(a: V, b: V, w: V, x: V, y: V) -> [V; 6] {
-    let s = a.mul_add(x, b * y);
-    [a * w, b * w, s * w, y.mul_add(s, b), x.mul_add(s, a), b.mul_add(x, -(a * y))]
 }

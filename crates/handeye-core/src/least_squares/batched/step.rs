@@ -56,6 +56,9 @@ impl Equations {
 
 /// The solution of the equations with `damping` added to the diagonal and the gradient's sign changed; `None` if they
 /// are not positive definite.
+///
+/// The elimination is that of [`crate::positive`] with the size known: sharing it costs a small solve a tenth more
+/// instructions.
 pub(super) struct Step<'a> {
     pub equations: &'a Equations,
     pub damping: &'a Vector12,

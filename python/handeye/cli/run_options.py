@@ -1,0 +1,93 @@
+"""Groups of options of `handeye run`: limits of motion, time-outs, and what is wrong in a simulated cell."""
+
+from dataclasses import dataclass, replace
+
+from cyclopts import Parameter
+
+from handeye.session.attempt import Patience
+from handeye.session.drivers import MANUAL
+from handeye.session.faults import FaultRates
+from handeye.session.settings import Collisions, Simulation
+from handeye.session.simulated import usual_errors
+
+
+@Parameter(name="*", group="Limits of motion and views")
+@dataclass(frozen=True)
+class Limits:
+    """What no motion and no view may leave."""
+
+    workspace_mm: tuple[float, float, float, float, float, float] | None = None
+    """Box that the flange may move in, in the frame of the base: least x y z, largest x y z. Needed to move
+    a real arm."""
+    floor_mm: float = 0.0
+    """Height of table or floor in that frame."""
+    speed_deg_s: float = 30.0
+    """No joint moves faster."""
+    distance_mm: tuple[float, float] = (250.0, 900.0)
+    """Nearest and farthest distance from camera to target."""
+    tilt_deg: float = 45.0
+    """Largest angle at which the target is seen."""
+    margin_px: float = 20.0
+    """Distance from the border of the image."""
+    collisions: Collisions = Collisions.AUTO
+    """How links are kept from touching one another: meshes (the shapes of the URDF, with the extra meshes),
+    capsules, or auto for meshes where there are any."""
+
+
+@Parameter(name="*", group="Time-outs")
+@dataclass(frozen=True)
+class Timeouts:
+    """How long a real robot and camera may take; nothing new is sent before the last call is back."""
+
+    move_timeout_s: float | None = None
+    """For one motion: 60 s, an hour where a person moves the arm."""
+    read_timeout_s: float | None = None
+    """For telling where it stands, and for stopping: 5 s, ten minutes where a person is asked."""
+    camera_timeout_s: float | None = None
+    """For one picture: 10 s, ten minutes from a folder or where a person moves the arm."""
+
+    def patience(self, driver: str, images: str) -> Patience:
+        """Return it as the library takes it."""
+        by_hand = driver.partition(":")[0] == MANUAL
+        # A person takes the time that a person takes.
+        usual = Patience(move_s=3600.0, read_s=600.0, grab_s=600.0) if by_hand else Patience()
+        if images.partition(":")[0] == "folder":
+            usual = replace(usual, grab_s=600.0)
+        stated = {
+            "move_s": self.move_timeout_s,
+            "read_s": self.read_timeout_s,
+            "grab_s": self.camera_timeout_s,
+        }
+        return replace(usual, **{name: value for name, value in stated.items() if value is not None})
+
+
+@Parameter(name="*", group="Simulated cell")
+@dataclass(frozen=True)
+class Simulated:
+    """What is wrong in the simulated cell."""
+
+    arm_errors: float = 1.0
+    """Factor on the arm's usual errors; 0 is an exact arm."""
+    blur_px: float = 0.6
+    """Blur of the pictures."""
+    pixel_noise: float = 2.0
+    """Noise of the pictures, in grey values."""
+    points_only: float | None = None
+    """Project points with so much noise (px) instead of rendering and detecting: faster."""
+    faults: float = 0.0
+    """Share of attempts that each kind of fault of robot and camera befalls."""
+
+    def simulation(self) -> Simulation:
+        """Return it as the library takes it."""
+        usual = usual_errors()
+        scaled = type(usual)(**{name: value * self.arm_errors for name, value in vars(usual).items()})
+        rates = None
+        if self.faults > 0:
+            rates = FaultRates(**dict.fromkeys(vars(FaultRates()), self.faults))
+        return Simulation(
+            scaled,
+            rates,
+            blur_px=self.blur_px,
+            pixel_noise=self.pixel_noise,
+            points_only=self.points_only,
+        )

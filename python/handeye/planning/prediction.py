@@ -1,0 +1,200 @@
+"""What a view that is not taken yet would teach, predicted from an estimate."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from handeye import _core
+from handeye.errors import DegenerateError
+from handeye.solving.estimate import Estimate
+from handeye.types.arrays import FloatArray
+from handeye.types.pose import Pose
+
+# Least known directions of X and Y along which sigma points are laid, a metre and a radian weighing alike.
+SIGMA_POINT_DIRECTIONS = 4
+# Candidates whose covariances are held in memory at a time.
+_BATCH = 1000
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a candidate must show of the target to count.
+
+    Parameters
+    ----------
+    margin_px
+        Distance of every counted point from the border of the image.
+    fewest
+        Fewest points in sight; None for all of the target.
+    known
+        The candidates are recorded views that are known to show the target: nothing is checked but that the
+        lens can see it at the current estimate.
+    """
+
+    margin_px: float = 0.0
+    fewest: int | None = None
+    known: bool = False
+
+
+class Prediction:
+    """What an estimate predicts of candidate views.
+
+    Parameters
+    ----------
+    estimate
+        What is believed now.
+    sight
+        What a candidate must show.
+
+    Raises
+    ------
+    DegenerateError
+        The information is singular.
+    """
+
+    def __init__(self, estimate: Estimate, sight: Sight) -> None:
+        self.estimate, self.sight = estimate, sight
+        self._belief = _core.Belief(estimate.information)
+        left, right = estimate.station_noise.roots(estimate.mounting)
+        width, height = estimate.camera.size_px
+        self._predictor = _core.Predictor(
+            estimate.camera.lens,
+            estimate.camera.parameters,
+            estimate.target.points,
+            estimate.target.radii_m,
+            estimate.X.matrix,
+            estimate.Y.matrix,
+            pixel_sigma=estimate.candidate_sigma_px,
+            robot_left=left,
+            robot_right=right,
+            free_camera=list(estimate.free_camera) or None,
+            board_scale=estimate.board_scale is not None,
+            kinematic_count=0 if estimate.arm is None else estimate.arm.constants,
+            image_size=None if sight.known else (width, height),
+            margin_px=sight.margin_px,
+            fewest=1 if sight.known else sight.fewest or estimate.target.point_count,
+        )
+
+    def gains(
+        self, criterion: _core.Criterion, motions: FloatArray, joints: FloatArray | None = None
+    ) -> FloatArray:
+        """(N,) gain of candidate views at `motions` (N, 4, 4); NaN where too little would be in sight.
+
+        Parameters
+        ----------
+        criterion
+            What a view is worth.
+        motions
+            A of the chain of each candidate.
+        joints
+            (N, n) joint positions of the candidates, if the arm is known. Without them constants of the arm
+            are taken as if they moved nothing.
+        """
+        return self._predictor.gains(self._belief, criterion, motions, arm=self._arm(joints))
+
+    def informations(self, motions: FloatArray, joints: FloatArray | None = None) -> FloatArray:
+        """(N, n, n) information of candidate views; zero where too little would be in sight."""
+        return self._predictor.informations(motions, arm=self._arm(joints))
+
+    def covariances(self, motions: FloatArray, joints: FloatArray | None = None) -> FloatArray:
+        """(N, 6, 6) covariance of the twist of X predicted after a view at each of motions (N, 4, 4).
+
+        A view adds to the information; what it does not lessen, errors that come again in every view
+        and what is not known of the noise, stays as it is.
+
+        Raises
+        ------
+        DegenerateError
+            The information is singular.
+        """
+        after = np.zeros((len(motions), 6, 6))
+        try:
+            for first in range(0, len(motions), _BATCH):
+                batch = slice(first, first + _BATCH)
+                taught = self.informations(motions[batch], None if joints is None else joints[batch])
+                after[batch] = _hand_eye_covariance(self.estimate.information + taught)
+        except np.linalg.LinAlgError as error:
+            raise DegenerateError("the information of the views is singular") from error
+        return self.predicted(after)
+
+    def predicted(self, after: FloatArray) -> FloatArray:
+        """Covariances (..., 6, 6) of X after views that leave these by the information alone."""
+        estimate = self.estimate
+        before, whole = self._belief.covariance[:6, :6], estimate.hand_eye_covariance
+        if estimate.arm is None and not _is_proportional(before, whole):
+            return after + _positive(whole - before)
+        root = np.linalg.cholesky(whole) @ np.linalg.inv(np.linalg.cholesky(before))
+        return root @ after @ root.T
+
+    def _arm(self, joints: FloatArray | None) -> tuple[FloatArray, FloatArray] | None:
+        arm = self.estimate.arm
+        if arm is None or joints is None:
+            return None
+        return arm.candidates(self.estimate.mounting, joints, self.estimate.station_noise.joint_rad)
+
+
+def gains(
+    estimate: Estimate,
+    criterion: _core.Criterion,
+    motions: FloatArray,
+    sight: Sight,
+    *,
+    joints: FloatArray | None = None,
+    over_posterior: bool = False,
+) -> FloatArray:
+    """(N,) gain of candidate views at `motions` (N, 4, 4); see `Prediction.gains`.
+
+    Parameters
+    ----------
+    over_posterior
+        Average over sigma points of X and Y as well: a young estimate is wrong, and a view must be worth
+        taking wherever the truth may be. Where a sigma point does not show the target it gains nothing.
+
+    Raises
+    ------
+    DegenerateError
+        The information is singular.
+    """
+    here = Prediction(estimate, sight).gains(criterion, motions, joints)
+    if not over_posterior:
+        return here
+    points = [here]
+    for X, Y in _sigma_points(estimate):
+        there = Prediction(replace(estimate, X=X, Y=Y), sight).gains(criterion, motions, joints)
+        points.append(np.nan_to_num(there))
+    return np.mean(points, axis=0)
+
+
+def _sigma_points(estimate: Estimate) -> list[tuple[Pose, Pose]]:
+    """X and Y on both sides along the least known directions (unscented transform, no central weight)."""
+    values, vectors = np.linalg.eigh(estimate.covariance[:12, :12])
+    points: list[tuple[Pose, Pose]] = []
+    for value, vector in list(zip(values, vectors.T, strict=True))[-SIGMA_POINT_DIRECTIONS:]:
+        step = np.sqrt(SIGMA_POINT_DIRECTIONS * max(float(value), 0.0)) * vector
+        points += [
+            (Pose.exp(signed[:6]) @ estimate.X, Pose.exp(signed[6:]) @ estimate.Y) for signed in (step, -step)
+        ]
+    return points
+
+
+def _is_proportional(first: FloatArray, second: FloatArray) -> bool:
+    return np.allclose(first / np.trace(first), second / np.trace(second), rtol=1e-6, atol=1e-12)
+
+
+def _positive(matrix: FloatArray) -> FloatArray:
+    """Return the positive semidefinite part of a symmetric matrix (6, 6), a metre and a radian weighing alike."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T
+
+
+def _hand_eye_covariance(information: FloatArray) -> FloatArray:
+    """Return the block (..., 6, 6) of X in the inverse of informations (..., n, n), never indefinite.
+
+    Scaled to a unit diagonal first, as metres, radians and pixels differ by many orders of magnitude; then by
+    Cholesky, ``(L L')^-1 = W' W`` with the columns of ``W = L^-1`` that belong to X.
+    """
+    scale = 1 / np.sqrt(np.diagonal(information, axis1=-2, axis2=-1))
+    root = np.linalg.cholesky(information * scale[..., :, None] * scale[..., None, :])
+    columns = np.eye(information.shape[-1])[:, :6]
+    half = np.linalg.solve(root, np.broadcast_to(columns, (*root.shape[:-1], 6))) * scale[..., None, :6]
+    return np.swapaxes(half, -1, -2) @ half

@@ -1,0 +1,226 @@
+"""Break one rule of safety or statistics at a time in a copy of the tree, and see that a test notices.
+
+.venv/bin/python tools/mutants.py                        all of them, some ten minutes
+.venv/bin/python tools/mutants.py --only speed --rust    those with a word in their name, in Rust too
+
+Each mutant is a text replaced once in one file, and the few tests that should fail then. A text that is not
+there any more is an error: the mutant has to follow the code. Not part of CI.
+"""
+# ruff: noqa: E501 - a mutant has a line
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A rule, the file that holds it, the text that is replaced by what, and the tests that should fail."""
+
+    rule: str
+    path: str
+    old: str
+    new: str
+    tests: str
+
+
+ATTEMPT, CHOOSING = "session/attempt.py", "session/choosing.py"
+SAFETY, CALLS, LOOP = "session/safety.py", "session/calls.py", "session/loop.py"
+JOURNAL, STORE, READING = "session/journal.py", "session/store.py", "robots/reading.py"
+FOLDER, MANUAL = "cameras/folder.py", "robots/manual.py"
+T_SAFETY, T_JOURNAL, T_CALLS = (
+    "session/test_safety.py",
+    "session/test_journal.py",
+    "session/test_calls.py",
+)
+T_READING, T_FOLDER, T_MANUAL = "robots/test_reading.py", "cameras/test_folder.py", "robots/test_manual.py"
+T_RULES, T_LOOP, T_BREAKS = "session/test_rules.py", "session/test_loop.py", "session/test_breaks.py"
+T_COLLISIONS = "planning/test_collisions.py"
+
+# fmt: off
+MUTANTS = (
+    # What is sent.
+    Mutant("workspace of the goal", SAFETY, "if not body.workspace.contains(", "if False and not body.workspace.contains(", T_SAFETY),
+    Mutant("speed of the goal", SAFETY, "if goal.speed_rad_s > speed_rad_s", "if goal.speed_rad_s > 9 * speed_rad_s", T_SAFETY),
+    Mutant("joints and pose are one place", SAFETY, "if not is_near(Pose(arm.forward(joints))", "if False and not is_near(Pose(arm.forward(joints))", T_SAFETY),
+    Mutant("joints of the goal are there", SAFETY, "if goal.joints_rad is None:\n        return None if standing_rad is None", "if goal.joints_rad is None:\n        return None if True", T_SAFETY),
+    Mutant("joints of the goal are numbers", SAFETY, "or not np.isfinite(joints).all()", "", T_SAFETY),
+    Mutant("way to the goal", SAFETY, "return body.obstacle_on_path(standing_rad, joints)", "return body.obstacles(joints[np.newaxis])[0]", T_SAFETY),
+    Mutant("nothing checked at all", SAFETY, "return body.obstacle_on_path(standing_rad, joints)", "return None", T_SAFETY),
+    Mutant("tool takes part", SAFETY, "return Body(arm, workspace, mounted_points(estimate), solids)", "return Body(arm, workspace, solids=solids)", T_SAFETY),
+    Mutant("check before sending", ATTEMPT, "    if why is not None:\n        return Missed(Failure.MOTION_REFUSED", "    if False:\n        return Missed(Failure.MOTION_REFUSED", T_SAFETY),
+    Mutant("confirmation", ATTEMPT, "if cell.confirm is not None and not cell.confirm(goal):", "if False:", T_LOOP),
+    Mutant("limits of the last joint", "planning/collisions.py", "beyond = np.any((joints < low_limit) | (joints > high_limit), axis=1)", "beyond = np.any(((joints < low_limit) | (joints > high_limit))[:, :-1], axis=1)", T_SAFETY),
+    Mutant("lower limits", "planning/collisions.py", "(joints < low_limit) | (joints > high_limit)", "(joints > high_limit)", T_SAFETY),
+    Mutant("floor", "planning/collisions.py", "low = np.any(frames[:, 3:, 2, 3]", "low = 0 * np.any(frames[:, 3:, 2, 3]", T_COLLISIONS),
+    Mutant("workspace of the tool", "planning/collisions.py", "ends = np.concatenate([frames[:, -1:, :3, 3], tools], axis=1)", "ends = frames[:, -1:, :3, 3]", T_SAFETY),
+    Mutant("touching itself", "planning/collisions.py", "touching[left] = self._touches_itself(frames[left], tools[left])", "pass", T_COLLISIONS),
+    Mutant("the way, not its end alone", "planning/collisions.py", "why = self.obstacles(np.concatenate([path[1:] for path in paths]))", "why = self.obstacles(np.concatenate([np.tile(path[-1:], (len(path) - 1, 1)) for path in paths]))", T_COLLISIONS),
+    Mutant("where the arm stands, in decisions", CHOOSING, "if entry.standing_rad is not None:\n                return entry.standing_rad", "if False:\n                return ()", T_SAFETY),
+    Mutant("paths from the posture of the start", CHOOSING, "        for entry in reversed(situation.entries):\n            if entry.standing_rad", "        for entry in ():\n            if entry.standing_rad", T_SAFETY),
+    Mutant("speed passed on", CHOOSING, "return Goal(label, pose, joints, self._speed_rad_s)", "return Goal(label, pose, joints)", T_SAFETY),
+    Mutant("speed of the slowest joint", CHOOSING, "return min([self._wish.speed_rad_s, *turning.tolist()])", "return self._wish.speed_rad_s", T_SAFETY),
+    Mutant("start where it may go", "session/configuration.py", '    if why is not None:\n        raise InputError(\n            f"the arm stands', '    if False:\n        raise InputError(\n            f"the arm stands', T_SAFETY),
+    # What is believed.
+    Mutant("reading: limits", READING, "if fits and len(beyond) == 0:", "if fits:", T_READING),
+    Mutant("reading: forward kinematics", READING, "fits = is_near(pose, reading.T_base_flange, AGREEMENT_M, AGREEMENT_RAD)", "fits = True", T_READING),
+    Mutant("reading: number of joints", READING, "if len(joints) != len(arm):", "if len(joints) > 99:", T_READING),
+    Mutant("reading: joints needed", READING, "        if joints_needed:", "        if False:", T_READING),
+    Mutant("reading: type", READING, "if not isinstance(answer, Reading):", "if False:", T_READING),
+    Mutant("reading: degrees named", READING, 'yield "the joint positions are in degrees, expected radians", radians', "pass", T_READING),
+    Mutant("reading: inverse named", READING, "(inverse, reported.inverse()),", "", T_READING),
+    Mutant("checked before every motion", ATTEMPT, "return checked_reading(answer, self.arm, joints_needed=not self.by_hand, expected=expected)", "return typed_reading(answer)", T_SAFETY),
+    Mutant("contract at the start", LOOP, "        check_at_rest(self._cell)\n", "", T_SAFETY),
+    Mutant("stop works before the first motion", "session/contract.py", '    if why is not None:\n        raise DeviceError(\n            f"the robot cannot be stopped', '    if False:\n        raise DeviceError(\n            f"the robot cannot be stopped', T_SAFETY),
+    Mutant("rest before the first motion", "session/contract.py", "if not is_near(first.T_base_flange, second.T_base_flange, REST_M, REST_RAD):\n        raise", "if False:\n        raise", T_SAFETY),
+    Mutant("stop after a failure", ATTEMPT, "    if not refused:\n        stopped = cell.stop()", "    if False:\n        stopped = cell.stop()", T_SAFETY),
+    Mutant("read again after a failure", ATTEMPT, "        cell.robot_calls.wait(cell.patience.move_s)\n        after = cell.read()", "        cell.robot_calls.wait(cell.patience.move_s)\n        after = before", T_SAFETY),
+    Mutant("a robot that does not move", ATTEMPT, "before.T_base_flange, after.T_base_flange, STILL_M, STILL_RAD\n    ):", "before.T_base_flange, after.T_base_flange, STILL_M, STILL_RAD\n    ) and False:", T_SAFETY),
+    Mutant("workspace of the pose read back", ATTEMPT, 'return "outside the workspace"', "return None", T_SAFETY),
+    Mutant("posture read back", ATTEMPT, "return body.obstacles(np.array(reading.joints_rad)[np.newaxis])[0]", "return None", T_SAFETY),
+    Mutant("stop where a motion ended wrongly", ATTEMPT, "        if why is not None:\n            cell.stop()", "        if why is not None:\n            pass", T_SAFETY),
+    # One command at a time.
+    Mutant("wait for the last call", CALLS, "        self.wait(seconds)\n        return self._called(seconds, call, arguments, self._idle)", "        return self._called(seconds, call, arguments, self._idle)", T_CALLS),
+    Mutant("stop goes beside", CALLS, "return self._called(seconds, call, arguments, threading.Event())", "return self.run(seconds, call, *arguments)", T_CALLS),
+    Mutant("no clock in simulated cells", CALLS, "if math.isinf(seconds):\n            try:", "if False:\n            try:", T_CALLS),
+    Mutant("short messages", CALLS, "MAX_MESSAGE = 300", "MAX_MESSAGE = 300_000", T_CALLS),
+    Mutant("what can be shown", "errors.py", 'c if c.isprintable() else " " if c.isspace() else "?" for c in cut', "c for c in cut", T_CALLS),
+    Mutant("a driver's exit ends no session", CALLS, "except BaseException as error:  # noqa: BLE001 - whatever a driver raises", "except Exception as error:", T_CALLS),
+    Mutant("a robot that hangs ends the session", LOOP, "if self._cell.robot_calls.pending:", "if False:", T_SAFETY),
+    Mutant("a session told to go on goes on", LOOP, "self._forgiven_up_to = len(situation.entries)", "pass", T_SAFETY),
+    Mutant("views of other arms left out", LOOP, "if (len(view.joints_rad) == len(arm) if view.joints_rad is not None else not needed)", "if True", T_SAFETY),
+    # Pictures of now.
+    Mutant("stale frames", "cameras/capture.py", "STALE_FRAMES = 5", "STALE_FRAMES = 0", "cameras/test_capture.py"),
+    Mutant("the same picture twice", ATTEMPT, 'if digest in digests:\n            return Missed(Failure.STALE_IMAGE, "the same points', 'if False:\n            return Missed(Failure.STALE_IMAGE, "the same points', f"{T_LOOP}::test_each_fault_is_noticed_named_and_overcome"),
+    Mutant("a picture that repeats itself", "session/judging.py", "UNCHANGED_PX = 0.5", "UNCHANGED_PX = 0.0", T_SAFETY),
+    Mutant("frames are checked", "cameras/protocol.py", "if not isinstance(answer, Frame):", "if False:", T_SAFETY),
+    Mutant("folder: settled", FOLDER, "SETTLED_S = 0.2", "SETTLED_S = 0.0", T_FOLDER),
+    Mutant("folder: what lay there", FOLDER, "if old.get(name) == state:", "if False:", T_FOLDER),
+    Mutant("folder: being written", FOLDER, "if name in growing:", "if False:", T_FOLDER),
+    Mutant("folder: time", FOLDER, "if modified_s < asked_s - CLOCK_STEP_S:", "if False:", T_FOLDER),
+    Mutant("folder: content", FOLDER, "if digest in self._digests:", "if False:", T_FOLDER),
+    Mutant("folder: another format", FOLDER, "if self._stems.get(path.stem, name) != name:", "if False:", T_FOLDER),
+    # The disk.
+    Mutant("journal brought to the disk", JOURNAL, "                    file.write(line)\n                    file.flush()\n                    os.fsync(file.fileno())", "                    file.write(line)\n                    file.flush()", T_RULES),
+    Mutant("recording brought to the disk", "datasets/writing.py", "        file.flush()\n        os.fsync(file.fileno())\n\n\ndef _beside", "        file.flush()\n\n\ndef _beside", T_RULES),
+    Mutant("checkpoint brought to the disk", "evaluation/checkpoint.py", "    file.flush()\n    os.fsync(file.fileno())", "    file.flush()", "evaluation/test_checkpoint.py"),
+    Mutant("chain of the journal", JOURNAL, "chain = _digest(chain + body)\n        entry", "chain = found or _digest(chain + body)\n        entry", T_JOURNAL),
+    Mutant("journal follows from the settings", JOURNAL, 'chain, size, ending = known.digest, 0, b""', 'chain, size, ending = b"", 0, b""', T_JOURNAL),
+    Mutant("settings are checked", JOURNAL, "    if changed:\n", "    if False:\n", T_JOURNAL),
+    Mutant("nothing deleted", STORE, "    if more:\n", "    if False:\n", T_JOURNAL),
+    Mutant("edited views", STORE, "elif not _same(view, known[name]):", "elif False:", T_JOURNAL),
+    Mutant("edited camera or mounting", STORE, "if found.recording.to_dict() != base.to_dict():", "if False:", T_JOURNAL),
+    Mutant("lost files made again", STORE, "        if not current:\n", "        if False:\n", T_JOURNAL),
+    Mutant("partial files", STORE, "            remove_partials(part)", "            pass", T_JOURNAL),
+    Mutant("another arm half-way", "session/settings.py", "if settings.get(name, fingerprint) != fingerprint:", "if False:", T_JOURNAL),
+    Mutant("one process at a time", STORE, "fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", T_BREAKS + "::test_two_processes_do_not_write_one_session"),
+    Mutant("interruption stops the arm", LOOP, "            self._cell.stop()\n            raise", "            raise", T_BREAKS + "::test_an_interruption_stops_the_arm_and_leaves_the_session_whole"),
+    # Statistics, and what people type.
+    Mutant("tails of Student", "session/request.py", "if np.isfinite(degrees_of_freedom):", "if False:", T_RULES),
+    Mutant("both radii", "session/request.py", "or now.rotation_deg > self.rotation_deg", "", T_RULES),
+    Mutant("probability", "session/request.py", "PROBABILITY = 0.95", "PROBABILITY = 0.9", T_RULES),
+    Mutant("seed of the candidates", CHOOSING, "np.random.default_rng([self._wish.seed, 4, len(situation.entries)])", "np.random.default_rng([0, 4, len(situation.entries)])", T_RULES),
+    Mutant("order of the covariance", "types/calibration.py", '("tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")', '("rx_rad", "ry_rad", "rz_rad", "tx_m", "ty_m", "tz_m")', "types/test_calibration.py"),
+    Mutant("one view in both halves", "evaluation/protocol.py", "_indices(np.sort(order[middle:]))", "_indices(np.sort(order[middle - 1 :]))", "evaluation/test_protocol.py"),
+    Mutant("one view held out and in the pool", "evaluation/protocol.py", "rest = np.sort(order[held_out_count:])", "rest = np.sort(order[max(held_out_count - 1, 0) :])", "evaluation/test_protocol.py"),
+    Mutant("units by hand", MANUAL, "if _NEAREST_M <= far <= reach:", "if True:", T_MANUAL),
+    Mutant("joints that nobody told", MANUAL, "shown = goal.joints_rad if self._arm is None or self._joints_told else None", "shown = goal.joints_rad", T_MANUAL),
+    Mutant("asked again after a refusal", MANUAL, "        self._doubtful = True\n        self._reading = self._read(f", "        self._reading = self._read(f", T_MANUAL),
+    Mutant("millimetres of the pendant", MANUAL, "[*(value / 1e3 for value in numbers[:3]), *numbers[3:]]", "numbers", T_MANUAL),
+)
+
+KINEMATICS = "crates/handeye-core/src/kinematics"
+CHAIN, INVERSE, BATCH = (f"{KINEMATICS}/{name}.rs" for name in ("chain", "inverse", "batch"))
+RUST = (
+    Mutant("core: upper limits", CHAIN, "(j.lower..=j.upper).contains(q)", "*q >= j.lower", "kinematics"),
+    Mutant("core: lower limits", CHAIN, "(j.lower..=j.upper).contains(q)", "*q <= j.upper", "kinematics"),
+    Mutant("core: length of a posture", CHAIN, "q.len() == self.len() && self.joints", "self.joints", "kinematics"),
+    Mutant("core: number of joints", CHAIN, "joints.is_empty() || joints.len() > MAX_JOINTS", "joints.is_empty()", "kinematics"),
+    Mutant("core: positions that are no numbers", BATCH, "!q.is_finite()", "q.is_infinite() && q.is_nan()", "kinematics"),
+    Mutant("core: answers within the limits", INVERSE, "    q.clamp(lower, upper)\n", "    q\n", "kinematics"),
+    Mutant("core: answers that reach", INVERSE, "off_m <= options.tolerance_m", "off_m <= 1e5 * options.tolerance_m", "kinematics"),
+    Mutant("core: answers that turn", INVERSE, "off_rad <= options.tolerance_rad", "off_rad <= 1e5 * options.tolerance_rad", "kinematics"),
+    Mutant("core: other postures", INVERSE, "const DISTINCT: f64 = 1e-3;", "const DISTINCT: f64 = 10.0;", "kinematics"),
+)
+
+# fmt: on
+
+
+def copied(root: Path) -> None:
+    """Copy what git knows, and the built core, into an empty folder."""
+    files = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split("\n")
+    built = [str(path.relative_to(ROOT)) for path in (ROOT / "python" / "handeye").glob("_core*")]
+    for name in {*files, *built} - {""}:
+        if (ROOT / name).is_file():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, root / name)
+
+
+def fails(root: Path, mutant: Mutant, *, rust: bool) -> bool:
+    """Tell whether the tests of a mutant fail."""
+    if rust:
+        command = ["cargo", "test", "--quiet", "--locked", "-p", "handeye-core", mutant.tests]
+        # What all mutants share is compiled once.
+        environment = dict(os.environ) | {"CARGO_TARGET_DIR": str(ROOT / "target" / "mutants")}
+    else:
+        test, _, name = mutant.tests.partition("::")
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", f"tests/{test}"]
+        command += ["-k", name] if name else []
+        environment = dict(os.environ) | {"PYTHONPATH": str(root / "python"), "PYTHONDONTWRITEBYTECODE": "1"}
+    try:
+        done = subprocess.run(
+            command, cwd=root, env=environment, capture_output=True, check=False, timeout=900
+        )
+    except subprocess.TimeoutExpired:
+        return True
+    if not rust and done.returncode not in {0, 1, 2}:
+        raise RuntimeError(done.stdout.decode()[-2000:] + done.stderr.decode()[-2000:])
+    return done.returncode != 0
+
+
+def main() -> int:
+    """Try every mutant; return 1 if one is not noticed."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--only", default="", help="a word of the rule")
+    parser.add_argument("--rust", action="store_true", help="those in Rust, which take a minute each")
+    options = parser.parse_args()
+    mutants = [m for m in (RUST if options.rust else MUTANTS) if options.only in m.rule]
+    unnoticed: list[str] = []
+    with tempfile.TemporaryDirectory() as name:
+        root = Path(name)
+        copied(root)
+        for number, mutant in enumerate(mutants, start=1):
+            path = root / (mutant.path if options.rust else f"python/handeye/{mutant.path}")
+            text = path.read_text()
+            if mutant.old not in text:
+                print(f"{mutant.rule}: the text to replace is not in {mutant.path} any more")
+                return 2
+            began = time.monotonic()
+            path.write_text(text.replace(mutant.old, mutant.new, 1))
+            noticed = fails(root, mutant, rust=options.rust)
+            path.write_text(text)
+            if not noticed:
+                unnoticed.append(mutant.rule)
+            seconds = time.monotonic() - began
+            said = "noticed" if noticed else "NOT NOTICED"
+            print(f"{number:>3} of {len(mutants)} {said:<11} {seconds:5.1f} s  {mutant.rule}", flush=True)
+    print(f"{len(mutants) - len(unnoticed)} of {len(mutants)} noticed; not: {', '.join(unnoticed) or 'none'}")
+    return 1 if unnoticed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
