@@ -14,6 +14,7 @@ from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
 from handeye.datasets.shipped import shipped_recording
 from handeye.datasets.toml_text import toml_text
+from handeye.evaluation import example_folder
 from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
 from handeye.types import Charuco, Mounting
 from scenes import scene
@@ -99,7 +100,8 @@ def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
     compare("handeye solve, poses alone", answer)
 
 
-def test_demo_of_a_folder(handeye: Handeye, tmp_path: Path) -> None:
+def test_demo_of_a_folder(handeye: Handeye, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(example_folder, "VIEWS", 2)
     compare("handeye demo --folder", handeye.json("demo", "--folder", tmp_path / "pictures"))
 
 

@@ -13,6 +13,7 @@ from handeye.datasets.plausibility import DataWarning, recording_warnings
 from handeye.datasets.pose_files import PoseTable, read_pose_rows, read_poses
 from handeye.datasets.pose_pairs import PosePair, PosePairs
 from handeye.datasets.pose_rows import PoseRows, Reading, Statement
+from handeye.datasets.read_back import check_written
 from handeye.datasets.recording_format import LoadedRecording, read_recording, write_recording
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "Shot",
     "Statement",
     "UnreadPoses",
+    "check_written",
     "load",
     "read_camera",
     "read_pose_rows",
