@@ -1,10 +1,10 @@
 """Calibrate from a recording, and see how far the answer can be trusted."""
 
 import numpy as np
+from handeye.evaluation.region import position_region
 
 from handeye.datasets import read_recording
 from handeye.datasets.shipped import shipped_recording
-from handeye.evaluation.region import position_region
 from handeye.solving import solve
 
 # A folder with recording.toml and corners/; this one comes with the package.

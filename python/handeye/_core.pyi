@@ -341,10 +341,10 @@ class Criterion:
 class Predictor:
     """Predicts what candidate views would tell, at motions A (N, 4, 4).
 
-    `robot_left`, `robot_right` (6, 6): square roots of the covariances of the robot's error on both sides of A.
-    `kinematic_count`: constants of the arm among the parameters. `arm` of the candidates: roots (N, 6, r) of
-    the noise of the joints on the left of A, and columns (N, 6, kinematic_count) of the constants; without it
-    the constants move nothing.
+    `robot_left`, `robot_right` (6, 6): square roots of the covariances of the robot's error on both sides of
+    A. `kinematic_count`: constants of the arm among the parameters. `arm` of the candidates: roots (N, 6,
+    r) of the noise of the joints on the left of A, and columns (N, 6, kinematic_count) of the constants;
+    without it the constants move nothing.
     """
 
     def __init__(
@@ -468,13 +468,13 @@ def estimate_cell(
 ) -> Posterior:
     """The posterior of everything in a cell.
 
-    `stations` (S, 4, 4) are `T_base_flange` as reported. A camera is whether it is on the flange, its number of
-    free parameters, whether its prior comes from these very pixels, and that prior: information (n, n), mean
-    (n,), whether it may be too narrow by a level that is found. `targets`: whether each is on the flange.
-    `seen`: camera, target, its views, and for each of these its station and pixel variance in px^2.
-    `velocities` (S, 6): twists of the flange per second. `arm`: twists (S, 6, n) of the flange per joint and
-    (S, 6, m) per way of displacing a joint on its link, what a deviation of one means for each joint, joints
-    whose offset is a parameter, and which ways are in metres. `start`: X (C, 4, 4) and Y (T, 4, 4).
+    `stations` (S, 4, 4) are `T_base_flange` as reported. A camera is whether it is on the flange, its number
+    of free parameters, whether its prior comes from these very pixels, and that prior: information (n, n),
+    mean (n,), whether it may be too narrow by a level that is found. `targets`: whether each is on the
+    flange. `seen`: camera, target, its views, and for each of these its station and pixel variance in px^2.
+    `velocities` (S, 6): twists of the flange per second. `arm`: twists (S, 6, n) of the flange per joint
+    and (S, 6, m) per way of displacing a joint on its link, what a deviation of one means for each joint,
+    joints whose offset is a parameter, and which ways are in metres. `start`: X (C, 4, 4) and Y (T, 4, 4).
     """
 
 # Kinematics

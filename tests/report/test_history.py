@@ -7,7 +7,6 @@ import pytest
 from handeye.report.document import Within
 from handeye.report.history import MOST_POINTS, attempts, curve, request
 from handeye.session.entry import Entry, Failure
-from handeye.session.request import reach
 from handeye.session.settings import Configuration
 from handeye.session.store import create_session
 from handeye.solving import Measurements, make_estimator
@@ -45,7 +44,7 @@ def test_curve_is_what_the_first_views_say() -> None:
     assert points[-1].views == 9
     assert [point.views for point in points] == sorted({point.views for point in points})
     for point in (points[0], points[-1]):
-        now = reach(make_estimator(ModelName.AUTO)(measurements.select(range(point.views))))
+        now = make_estimator(ModelName.AUTO)(measurements.select(range(point.views))).within_95
         assert point.within_95 == Within(translation_mm=now.translation_mm, rotation_deg=now.rotation_deg)
     assert points[-1].within_95.translation_mm < points[0].within_95.translation_mm
 

@@ -9,7 +9,8 @@ from scipy import stats
 
 from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import Step
-from handeye.session.request import Requested, radius
+from handeye.session.request import Requested
+from handeye.solving.confidence import radius
 from sessions import configured
 
 

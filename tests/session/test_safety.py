@@ -211,6 +211,30 @@ def _standing(arm: Arm, joints: np.ndarray) -> Reading:
     return Reading(Pose(arm.forward(joints)), tuple(joints.tolist()))
 
 
+def test_where_a_motion_ended_is_judged_too() -> None:
+    prepared, robot = watched()
+    arm, space = prepared.arm, prepared.cell.workspace
+    assert space is not None
+    low, high = arm.limits.T
+    drawn = np.random.default_rng(0).uniform(low, high, (2000, 6))
+    why = Body(arm, space).obstacles(drawn)
+    itself = next(
+        q for q, reason in zip(drawn, why, strict=True) if reason is not None and "itself" in reason
+    )
+    aside = HOME + np.array([0.8, 0, 0, 0, 0, 0])
+    narrow = replace(space, upper_m=np.array([1.4, 0.2, 1.7]))
+    for workspace, ended, words in ((space, itself, "itself"), (narrow, aside, "outside the workspace")):
+        prepared, robot = watched()
+        hidden = prepared.hidden_arm
+        assert hidden is not None
+        robot.move_to = lambda goal, to=ended, by=hidden: by.move_to(goal_at(arm, to, goal.label))  # type: ignore[method-assign]
+        outcome = tried(replace(prepared.cell, workspace=workspace), goal_at(arm, HOME + 0.05))
+        assert isinstance(outcome, Missed)
+        assert outcome.failure is Failure.ELSEWHERE
+        assert words in outcome.detail
+        assert robot.stops == 1
+
+
 def test_the_next_decision_begins_where_the_arm_says_it_stands(tmp_path: Path) -> None:
     # A protective stop half way to the first planned view: the journal says where the arm stands, and the
     # next goal is reached from there.

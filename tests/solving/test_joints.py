@@ -8,12 +8,12 @@ import pytest
 
 from handeye import _core
 from handeye.errors import InputError
-from handeye.evaluation.f_distribution import f_quantile
 from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
 from handeye.planning import Pool, rank
-from handeye.robots import Arm, ArmKinematics, Joint, arm_kinematics, open_arm
 from handeye.planning.prediction import Prediction, Sight
+from handeye.robots import Arm, ArmKinematics, Joint, arm_kinematics, open_arm
 from handeye.solving import AutoEstimator, AutoOptions, Estimate, Measurements, calibrate
+from handeye.solving.f_distribution import f_quantile
 from handeye.types import Mounting, Pose, Recording, View
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import RobotSide

@@ -8,8 +8,8 @@ use std::hint::black_box;
 
 use handeye_core::camera::{Camera, Feature, Lens};
 use handeye_core::information::criteria::Entropy;
-use handeye_core::information::{Belief, CandidateModel, Execution, Motions, Visibility};
-use handeye_core::least_squares::{Model, Options, Problem, Side, Solution, Start, solve};
+use handeye_core::information::{Belief, CandidateModel, Execution, Motions, RobotError, Visibility};
+use handeye_core::least_squares::{Model, Options, Problem, Solution, Start, solve};
 use handeye_core::se3::Se3;
 use handeye_core::simd::VectorUnit;
 use handeye_core::testing::Random;

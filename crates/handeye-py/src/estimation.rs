@@ -6,7 +6,7 @@ use handeye_core::estimation::{
 };
 use handeye_core::least_squares::PixelParameters;
 use handeye_core::se3::Se3;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
@@ -90,7 +90,7 @@ impl PoseMeasurements {
             return Err(invalid(py, &format!("camera parameter {i} of a lens with {most}")));
         }
         let columns = free.len() + usize::from(board_scale);
-        let parameters = (columns > 0).then(|| PixelParameters { camera: free, board_scale });
+        let parameters = (columns > 0).then_some(PixelParameters { camera: free, board_scale });
         let views = py
             .detach(|| {
                 poses
@@ -163,7 +163,7 @@ fn estimate_cell<'py>(
     let poses = convert::transforms(py, "stations", &stations)?;
     let mut assumptions =
         Assumptions { exact_robot, joint_scales: vec![], free_joints: vec![], link_lengths: vec![] };
-    let mut of_arm: Option<(Vec<DMatrix<f64>>, Vec<DMatrix<f64>>)> = None;
+    let mut of_arm = None;
     if let Some((joints, links, scales, free, lengths)) = arm {
         let (joints, links) = (jacobian_list(py, &joints)?, jacobian_list(py, &links)?);
         if joints.len() != poses.len() || links.len() != poses.len() {
@@ -183,7 +183,7 @@ fn estimate_cell<'py>(
         .map(|(k, pose)| Station {
             pose: *pose,
             velocity: velocities.as_ref().map(|v| v[k]),
-            joints: of_arm.as_ref().map(|(joints, _)| joints[k].clone()),
+            joints: of_arm.as_ref().map(|(joints, _): &(Vec<_>, Vec<_>)| joints[k].clone()),
             links: of_arm.as_ref().map(|(_, links)| links[k].clone()),
         })
         .collect();

@@ -1,6 +1,6 @@
 //! The assumptions of a solve, as a Python value.
 
-use handeye_core::least_squares::{ChainPrior, Model as CoreModel, Side};
+use handeye_core::least_squares::{ChainPrior, Model as CoreModel};
 use nalgebra::{DMatrix, SVector};
 use pyo3::prelude::*;
 
@@ -16,15 +16,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyclass(frozen, module = "handeye._core")]
 pub struct Model {
     pub inner: CoreModel,
-}
-
-/// `"left"` or `"right"` of the motion.
-pub fn side(py: Python<'_>, name: &str) -> PyResult<Side> {
-    match name {
-        "left" => Ok(Side::Left),
-        "right" => Ok(Side::Right),
-        other => Err(invalid(py, &format!("robot_side must be \"left\" or \"right\", found \"{other}\""))),
-    }
 }
 
 /// A square matrix of any size out of an `(n, n)` array.

@@ -10,8 +10,8 @@ from handeye.cli.failures import UsageError
 from handeye.planning import Candidate, Pool
 from handeye.planning.batch import OBJECTIVES, BatchPlan, plan_batch
 from handeye.planning.ordering import METRES_PER_RADIAN, Measure, Route, travel_order
-from handeye.robots import ArmKinematics
 from handeye.planning.prediction import Sight
+from handeye.robots import ArmKinematics
 from handeye.solving import Estimate
 from handeye.types import View
 from handeye.types.calibration import MM_PER_M

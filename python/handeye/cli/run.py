@@ -29,7 +29,6 @@ from handeye.session.drivers import REPLAY, Person
 from handeye.session.entry import Entry
 from handeye.session.journal import read_settings
 from handeye.session.loop import End, Session
-from handeye.session.request import reach
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore
@@ -250,7 +249,7 @@ class _Progress:
     def __call__(self, entry: Entry, estimate: Estimate | None) -> None:
         known = ""
         if estimate is not None:
-            now = reach(estimate)
+            now = estimate.within_95
             known = f"  (before: within {now.translation_mm:.2f} mm, {now.rotation_deg:.3f} deg)"
         what = "ok" if entry.view is not None else f"{entry.failure}: {entry.detail[:100]}"
         seconds = sum(entry.timings_s.values())
@@ -332,7 +331,7 @@ def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end:
         "request_met": end.reason is EndReason.ACCURACY_REACHED,
         "views": end.views,
         "attempts": end.attempts,
-        "within_95": None if end.reach is None else vars(end.reach),
+        "within_95": None if end.reach is None else end.reach.to_dict(),
         "true_error": error,
         "collisions_judged": _judged_by(prepared),
         "seed": configuration.seed,

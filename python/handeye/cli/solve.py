@@ -12,9 +12,9 @@ from handeye.cli.output import check_output, write_json
 from handeye.cli.solve_poses import answer_for_poses
 from handeye.cli.source import Source, mindful_of
 from handeye.datasets import PosePairs
-from handeye.evaluation.region import Ellipsoid, position_region
 from handeye.importing import Opened
 from handeye.solving import solve as solve_recording
+from handeye.solving.confidence import Ellipsoid, position_region, within
 from handeye.types.calibration import Calibration, JointOffset, ModelName, RobotSide
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ def _data(opened: Opened, calibration: Calibration, region: Ellipsoid) -> dict[s
         "recording": opened.recording.name,
         "layout": opened.layout,
         "source": opened.recording.source,
+        "within_95": within(calibration.covariance, calibration.degrees_of_freedom).to_dict(),
         **data,
         "camera_origin": opened.camera_origin.value,
         "position_region": region.to_dict(),
@@ -119,13 +120,16 @@ def _show(
     console.print()
     axes = " x ".join(figures(1e3 * float(length), 2) for length in region.semi_axes_m)
     worst = max(used, key=lambda view: view.rmse_px)
+    known = within(calibration.covariance, calibration.degrees_of_freedom)
+    stated = f"within {figures(known.translation_mm)} mm and {figures(known.rotation_deg)} deg"
     accuracy = both(calibration.sigma_translation_m, calibration.sigma_rotation_rad)
     residuals = f"{figures(calibration.rmse_px)} px RMS, worst view {worst.name}: {figures(worst.rmse_px)} px"
     pairs(
         console,
         [
-            ("accuracy", f"{accuracy} (one standard deviation of position and rotation)"),
-            ("95 % region", f"position within an ellipsoid of semi-axes {axes} mm"),
+            ("accuracy", f"{stated} with 95 % probability (centre of the camera, rotation)"),
+            ("standard deviation", f"{accuracy} of position and rotation"),
+            ("95 % ellipsoid", f"of the position, semi-axes {axes} mm"),
             ("residuals", residuals),
             ("noise", _noise(calibration)),
             *((f"joint {offset.joint}", _offset(offset)) for offset in calibration.joint_offsets),
@@ -155,12 +159,13 @@ def _noise(calibration: Calibration) -> str:
     if noise.robot_side is RobotSide.NONE:
         return f"{pixel}; robot poses taken as exact"
     share = noise.evidence.get(noise.robot_side.value)
-    certainty = "" if share is None else f" (probability {'over 99 %' if share > 0.99 else f'{share:.0%}'})"
+    certainty = "" if share is None else f" ({share:.0%} of its misfit)"
     robot = both(noise.robot_translation_m, noise.robot_rotation_rad)
     if noise.robot_side is RobotSide.JOINTS:
         joints = f"from {figures(float(np.rad2deg(noise.joint_rad)), 2)} deg in every joint"
         return f"{pixel}; robot {robot} per axis at the flange, {joints}{certainty}"
     if noise.robot_side is RobotSide.LINKS:
-        put_right = "from joints that sit wrongly on their links, put right in the answer"
+        put_right = "beside joints that sit wrongly on their links, put right in the answer"
         return f"{pixel}; robot {robot} per axis at the flange, {put_right}{certainty}"
-    return f"{pixel}; robot {robot} per axis, on the side of the {noise.robot_side}{certainty}"
+    side = f"mostly from the side of the {noise.robot_side}"
+    return f"{pixel}; robot {robot} per axis at the flange, {side}{certainty}"

@@ -1,6 +1,7 @@
 """The corners of one view as a CSV file: `id,u_px,v_px`, one point a line."""
 
 import re
+from functools import lru_cache
 from pathlib import Path
 
 from handeye.datasets.reading import MIB, number, read_text
@@ -13,6 +14,8 @@ MAX_BYTES = 8 * MIB
 _ID = re.compile(r"\d{1,9}", re.ASCII)
 
 
+# A session writes its recording again with every view, and most of its views are those of before.
+@lru_cache(maxsize=128)
 def corners_text(view: View) -> str:
     """Return the text of the file; numbers read back to the last bit."""
     rows = zip(view.point_ids.tolist(), view.pixels.tolist(), strict=True)

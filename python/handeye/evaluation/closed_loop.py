@@ -15,9 +15,9 @@ from handeye.evaluation.parallel import Progress, run_all
 from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import START_VIEWS
 from handeye.session.entry import Entry
-from handeye.session.request import Reach, reach
 from handeye.session.settings import Configuration, Simulation
 from handeye.solving import Estimate
+from handeye.solving.confidence import Within
 from handeye.types import Pose
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import MM_PER_M
@@ -242,13 +242,13 @@ def _driven(job: _Job, folder: Path) -> Drive:
     numbers = job.options.views
     # A run that ends early keeps what it has.
     earlier = [known[views] for views in numbers[:-1] if views in known]
-    rows = [_row(estimate.X, reach(estimate), prepared.truth.X) for estimate in earlier]
+    rows = [_row(estimate.X, estimate.within_95, prepared.truth.X) for estimate in earlier]
     rows += [_row(answer.X, end.reach, prepared.truth.X)] * (len(numbers) - len(rows))
     mm, deg, within_mm, within_deg = np.array(rows).T
     return Drive(job.policy, job.seed, mm, deg, within_mm, within_deg, entries, answer.X, answer.Y)
 
 
-def _row(X: Pose, promised: Reach, X_true: Pose) -> tuple[float, float, float, float]:
+def _row(X: Pose, promised: Within, X_true: Pose) -> tuple[float, float, float, float]:
     """Return the error as the promise means it: of the camera's centre, and of its rotation."""
     off = (X @ X_true.inverse()).log()
     mm, deg = MM_PER_M * float(np.linalg.norm(off[:3])), float(np.rad2deg(np.linalg.norm(off[3:])))

@@ -11,8 +11,8 @@ import numpy as np
 
 from handeye import _core
 from handeye.errors import DegenerateError, InputError
-from handeye.evaluation.f_distribution import f_quantile
 from handeye.solving import Estimate, Measurements
+from handeye.solving.f_distribution import f_quantile
 from handeye.types import Pose
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import MM_PER_M

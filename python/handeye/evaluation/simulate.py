@@ -13,6 +13,7 @@ from functools import cache
 import numpy as np
 
 from handeye import _core
+from handeye.detection import Detection, calibrate_camera
 from handeye.errors import SolveError
 from handeye.evaluation.metrics import inverses
 from handeye.robots import Arm, open_arm
@@ -39,8 +40,29 @@ class ErrorKind(StrEnum):
     """Each joint placed wrongly on the link before it: an error that changes smoothly with the posture."""
     WRONG_INTRINSICS = "wrong_intrinsics"
     """The robot is exact; the camera's parameters are off by more than their covariance says."""
+    MIXTURE_CELL = "mixture_cell"
+    """Encoders, offsets, links and play at once, as in the simulated cell of `handeye run`."""
+    MIXTURE_CELL_2 = "mixture_cell_2"
+    """The same, twice as large."""
+    MIXTURE_RANDOM = "mixture_random"
+    """The same and white errors of the poses, every level drawn for each cell."""
+    SAME_PICTURES = "same_pictures"
+    """The robot is exact; the camera is calibrated from the very pictures that are solved."""
+    BOARD_SCALE = "board_scale_0_1_percent"
+    """The robot is exact; the board is a thousandth larger than stated."""
+    FOCAL = "focal_0_3_percent"
+    """The robot is exact; focal lengths are 0.3 % off, and the covariance knows nothing of it."""
+    PIXEL_FIELD = "pixel_field"
+    """The robot is exact; the pixels of a view are off by a smooth field of 0.1 px beside their noise."""
+    ROBOT_NOISE_1_DEG = "robot_noise_1_deg"
+    """Each pose off by its own twist of a degree in the flange frame."""
 
 
+MIXTURES = (ErrorKind.MIXTURE_CELL, ErrorKind.MIXTURE_CELL_2, ErrorKind.MIXTURE_RANDOM)
+BOARD_SCALE = 1e-3
+FOCAL_SHARE = 3e-3
+# Deviation of a smooth field of pixel errors, and its length as a share of the board.
+FIELD_PX, FIELD_LENGTH = 0.1, 0.3
 TARGET = Chessboard(8, 11, 0.025)
 
 
@@ -115,24 +137,37 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
     deviation = random.multivariate_normal(np.zeros(len(PARAMETERS)), covariance, method="cholesky")
     if kind is ErrorKind.WRONG_INTRINSICS:
         deviation *= options.intrinsics_factor
+    if kind is ErrorKind.FOCAL:
+        deviation[:2] += FOCAL_SHARE * PARAMETERS[:2] * random.choice([-1.0, 1.0])
     true_camera = Camera(LENS, PARAMETERS + deviation, *SIZE_PX)
     X, Y = _mount(random, options.mounting)
     count = int(random.integers(options.views[0], options.views[1] + 1))
     joints, camera_poses = _views(random, arm, true_camera, X, Y, count, options)
-    reported, read = _reported(random, kind, arm, joints, options)
+    if kind in MIXTURES:
+        reported, read = arm.forward(joints), joints
+        true = _mixed(random, kind, arm, joints)
+        camera_poses = np.array([(X @ options.mounting.chain(Pose(pose)) @ Y).matrix for pose in true])
+    else:
+        reported, read = _reported(random, kind, arm, joints, options)
     views: list[View] = []
     target = options.target
     ids = np.arange(target.point_count)
+    field = _field_root(target.points) if kind is ErrorKind.PIXEL_FIELD else None
+    scale = 1 + BOARD_SCALE if kind is ErrorKind.BOARD_SCALE else 1.0
     for k, (pose, T_camera_target) in enumerate(zip(reported, camera_poses, strict=True)):
         pixels, _ = _core.project_features(
-            LENS, true_camera.parameters, T_camera_target, target.points, target.radii_m
+            LENS, true_camera.parameters, T_camera_target, scale * target.points, scale * target.radii_m
         )
         pixels = pixels + pixel_sigma * random.standard_normal(pixels.shape)
+        if field is not None:
+            pixels = pixels + field @ random.standard_normal(pixels.shape)
         views.append(View(f"view_{k + 1:02d}", Pose(pose), ids, pixels, joints_rad=read[k].tolist()))
     return Recording(
         f"simulated {kind.value} {number}",
         options.mounting,
-        Camera(LENS, PARAMETERS, *SIZE_PX, covariance=covariance),
+        _calibrated(target, views)
+        if kind is ErrorKind.SAME_PICTURES
+        else Camera(LENS, PARAMETERS, *SIZE_PX, covariance=covariance),
         target,
         tuple(views),
         Truth(X, Y),
@@ -272,19 +307,74 @@ def symmetric(matrix: FloatArray) -> FloatArray:
     return 0.5 * (matrix + matrix.T)
 
 
+def _calibrated(target: Target, views: list[View]) -> Camera:
+    """Return the camera as these very views have it."""
+    found = {view.name: Detection(view.point_ids, view.pixels) for view in views}
+    camera = calibrate_camera(target, found, SIZE_PX, lens=LENS).camera
+    return Camera(camera.lens, camera.parameters, *SIZE_PX, camera.covariance, from_views=True)
+
+
+def _field_root(points: FloatArray) -> FloatArray:
+    """Return the root (P, P) of the covariance of a smooth field over points (P, 3) of a board, px."""
+    size = float(np.ptp(points, axis=0).max()) * FIELD_LENGTH
+    away = np.linalg.norm(points[:, np.newaxis] - points, axis=2) / size
+    values, vectors = np.linalg.eigh(np.exp(-0.5 * away**2))
+    return FIELD_PX * vectors * np.sqrt(np.maximum(values, 0))
+
+
+def _mixed(random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray) -> FloatArray:
+    """Return where the flange (K, 4, 4) truly stands of an arm in which everything is wrong a little.
+
+    Levels of the cell are those of an arm in good order; drawn ones are log-uniform over a decade about them.
+    """
+    level = {
+        "encoder_deg": 0.005,
+        "offset_deg": 0.01,
+        "length_m": 1e-4,
+        "twist_deg": 0.0,
+        "play_deg": 0.005,
+        "pose_m": 0.0,
+        "pose_deg": 0.0,
+    }
+    if kind is ErrorKind.MIXTURE_RANDOM:
+        bounds = {
+            "encoder_deg": (0.002, 0.02),
+            "offset_deg": (0.005, 0.05),
+            "length_m": (0.05e-3, 0.5e-3),
+            "twist_deg": (0.003, 0.03),
+            "play_deg": (0.002, 0.02),
+            "pose_m": (0.005e-3, 0.1e-3),
+            "pose_deg": (0.0005, 0.01),
+        }
+        level = {name: _level(random, range_) for name, range_ in bounds.items()}
+    if kind is ErrorKind.MIXTURE_CELL_2:
+        level = {name: 2 * value for name, value in level.items()}
+    offsets: FloatArray = np.deg2rad(level["offset_deg"]) * random.standard_normal(joints.shape[1])
+    offsets[[0, -1]] = 0.0
+    twist_rad = float(np.deg2rad(level["twist_deg"]))
+    built = displaced(arm, random_displacements(random, arm, level["length_m"], twist_rad))
+    noise = np.deg2rad(level["encoder_deg"]) * random.standard_normal(joints.shape)
+    play = 0.5 * np.deg2rad(level["play_deg"]) * np.sign(random.standard_normal(joints.shape))
+    both = [
+        _core.se3_exp(np.array([_twist(random, level["pose_m"], level["pose_deg"]) for _ in joints]))
+        for _ in range(2)
+    ]
+    return both[0] @ built.forward(joints + offsets + noise - play) @ both[1]
+
+
 def _reported(
     random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray, options: CellOptions
 ) -> tuple[FloatArray, FloatArray]:
     """`T_base_flange` (K, 4, 4) and joints (K, 6) as the robot reports them; it truly stands at `joints`."""
     true = arm.forward(joints)
-    if kind in {ErrorKind.WHITE_FLANGE, ErrorKind.WHITE_BASE}:
-        degrees = _level(random, options.rotation_sigma_deg)
+    if kind in {ErrorKind.WHITE_FLANGE, ErrorKind.WHITE_BASE, ErrorKind.ROBOT_NOISE_1_DEG}:
+        degrees = 1.0 if kind is ErrorKind.ROBOT_NOISE_1_DEG else _level(random, options.rotation_sigma_deg)
         if options.translation_sigma_m is None:
             metres = np.deg2rad(degrees) * _level(random, options.lever_m)
         else:
             metres = _level(random, options.translation_sigma_m)
         errors = _core.se3_exp(np.array([_twist(random, metres, degrees) for _ in joints]))
-        return true @ errors if kind is ErrorKind.WHITE_FLANGE else errors @ true, joints
+        return errors @ true if kind is ErrorKind.WHITE_BASE else true @ errors, joints
     if kind is ErrorKind.ENCODER:
         sigma = np.deg2rad(_level(random, options.encoder_sigma_deg))
         read = joints + sigma * random.standard_normal(joints.shape)

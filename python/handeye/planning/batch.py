@@ -102,9 +102,7 @@ def plan_batch(
             hint="offer more candidates that show the target",
         )
     offered = informations[feasible]
-    chosen, _ = _core.select_views(
-        estimate.information, offered, count, objective, tool_points=tool_points_m
-    )
+    chosen, _ = _core.select_views(estimate.information, offered, count, objective, tool_points=tool_points_m)
     worth, bound, efficiency = _core.certify_views(
         estimate.information, offered, chosen, objective, tool_points=tool_points_m
     )

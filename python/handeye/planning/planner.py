@@ -9,9 +9,9 @@ from handeye import _core
 from handeye.errors import InputError
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.policies import NextBestView, Policy, Situation
+from handeye.planning.prediction import Sight, gains
 from handeye.planning.stopping import State, Stop, StopRule, first_verdict
 from handeye.planning.travel import Travel
-from handeye.planning.prediction import Sight, gains
 from handeye.solving.estimate import Estimate, Estimator
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray

@@ -182,7 +182,7 @@ def _is_proportional(first: FloatArray, second: FloatArray) -> bool:
 
 
 def _positive(matrix: FloatArray) -> FloatArray:
-    """Return the positive semidefinite part of a symmetric matrix (6, 6), a metre and a radian weighing alike."""
+    """Return the positive semidefinite part of a symmetric matrix (6, 6)."""
     values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
     return (vectors * np.maximum(values, 0.0)) @ vectors.T
 

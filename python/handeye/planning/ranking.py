@@ -12,8 +12,8 @@ import numpy as np
 
 from handeye import _core
 from handeye.planning.candidates import Candidate, Pool
-from handeye.planning.visibility import obstacles
 from handeye.planning.prediction import Prediction, Sight
+from handeye.planning.visibility import obstacles
 from handeye.solving.estimate import Estimate
 from handeye.types.arrays import FloatArray
 

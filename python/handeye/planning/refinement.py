@@ -19,9 +19,9 @@ from handeye.planning.constraints import ViewConstraints
 from handeye.planning.feasibility import FeasiblePool, candidates_at
 from handeye.planning.planner import PlannerOptions
 from handeye.planning.policies import Policy
+from handeye.planning.prediction import Prediction
 from handeye.planning.travel import Travel
 from handeye.robots import Arm
-from handeye.planning.prediction import Prediction
 from handeye.types.arrays import FloatArray, IndexArray
 
 

@@ -9,7 +9,6 @@ from handeye.report.document import Attempt, CurvePoint, Request, Within
 from handeye.robots import ArmKinematics, arm_kinematics, open_arm
 from handeye.session.deciding import START_VIEWS
 from handeye.session.journal import read_journal, read_settings
-from handeye.session.request import reach
 from handeye.session.settings import Configuration
 from handeye.session.store import is_session
 from handeye.solving import Measurements, make_estimator
@@ -60,7 +59,7 @@ def curve(
         except HandeyeError:
             continue
         if estimate.determined:
-            now = reach(estimate)
+            now = estimate.within_95
             within = Within(translation_mm=now.translation_mm, rotation_deg=now.rotation_deg)
             points.append(CurvePoint(views=views, within_95=within))
     return points

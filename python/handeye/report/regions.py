@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from handeye.evaluation.f_distribution import f_quantile
 from handeye.report.document import AtPoint, PositionAxis, RotationAxis, Within
 from handeye.report.wording import direction, figures, in_camera, turning_camera
-from handeye.session.request import PROBABILITY, radius
+from handeye.solving import confidence
+from handeye.solving.confidence import PROBABILITY, radius
+from handeye.solving.f_distribution import f_quantile
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import MM_PER_M
 
@@ -17,10 +18,8 @@ USUAL_DISTANCES_M = (0.3, 0.6, 1.0)
 
 def within(covariance: FloatArray, degrees_of_freedom: float) -> Within:
     """Return the radii within which position and rotation of the camera lie with 95 % probability."""
-    return Within(
-        translation_mm=MM_PER_M * radius(covariance[:3, :3], degrees_of_freedom),
-        rotation_deg=float(np.rad2deg(radius(covariance[3:, 3:], degrees_of_freedom))),
-    )
+    known = confidence.within(covariance, degrees_of_freedom)
+    return Within(translation_mm=known.translation_mm, rotation_deg=known.rotation_deg)
 
 
 def position_axes(
@@ -62,7 +61,7 @@ def rotation_axes(
 def _axes(
     covariance: FloatArray, degrees_of_freedom: float, R_parent_camera: FloatArray
 ) -> list[tuple[float, FloatArray, FloatArray]]:
-    """Return the axes of ``rho' C^-1 rho <= 3 F(3, nu)``, as in `handeye.evaluation.region`.
+    """Return the axes of ``rho' C^-1 rho <= 3 F(3, nu)``, as in `handeye.solving.confidence`.
 
     Each with its half length and its direction in the parent and in the camera, the longest first.
     """

@@ -5,7 +5,7 @@ from handeye.session.choosing import ArmChooser
 from handeye.session.deciding import Chooser, EndReason, Halt, Situation, Step
 from handeye.session.entry import Entry, Failure
 from handeye.session.loop import End, Session
-from handeye.session.request import Reach, Requested, reach
+from handeye.session.request import Requested
 from handeye.session.simulated import SimulatedCell, SimulationOptions, simulated_cell
 from handeye.session.starting import Start
 from handeye.session.store import SessionStore, create_session, is_session, open_session
@@ -21,7 +21,6 @@ __all__ = [
     "Failure",
     "Halt",
     "Patience",
-    "Reach",
     "Requested",
     "Session",
     "SessionStore",
@@ -34,6 +33,5 @@ __all__ = [
     "create_session",
     "is_session",
     "open_session",
-    "reach",
     "simulated_cell",
 ]

@@ -11,7 +11,6 @@ import numpy as np
 from handeye.planning import Proposal, Stop, StopReason
 from handeye.robots.protocol import Goal
 from handeye.session.entry import Entry
-from handeye.session.request import reach
 from handeye.solving import Estimate, Estimator, Measurements
 from handeye.types import View
 from handeye.types.kinematics import Kinematics
@@ -141,7 +140,7 @@ def estimator_of(estimate: Estimate) -> Estimator:
 
 def decision_of(answer: Proposal, estimate: Estimate, more: Mapping[str, Any]) -> dict[str, Any]:
     """Return how a proposal came about, for the journal."""
-    now = reach(estimate)
+    now = estimate.within_95
     return {
         "predicted_gain": answer.predicted_gain,
         "candidates": {

@@ -12,11 +12,11 @@ from handeye.session.attempt import Cell
 from handeye.session.contract import check_at_rest
 from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step
 from handeye.session.entry import Entry
-from handeye.session.request import Reach, reach
 from handeye.session.store import SessionStore
 from handeye.session.taking import Taker
 from handeye.session.wish import Wish
 from handeye.solving import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
+from handeye.solving.confidence import Within
 from handeye.solving.mistakes import examine
 from handeye.types import View
 from handeye.types.calibration import Calibration, ModelName
@@ -32,7 +32,7 @@ class End:
     reason: EndReason
     sentence: str
     calibration: Calibration | None
-    reach: Reach | None
+    reach: Within | None
     views: int
     attempts: int
 
@@ -180,7 +180,7 @@ class Session:
             estimate = self._estimator(examination.measurements)
             if estimate.determined:
                 calibration = calibrate_examined(examination, self._wish.model, kinematics=self._kinematics)
-                radii = reach(estimate)
+                radii = estimate.within_95
         return End(reason, sentence, calibration, radii, len(views), len(entries))
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from handeye.planning import Planner, PlannerOptions, Pool, Stop
+from handeye.planning.prediction import Sight
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics, arm_kinematics
 from handeye.robots.protocol import Goal
@@ -18,7 +19,6 @@ from handeye.session.deciding import (
     halt_of,
 )
 from handeye.session.wish import Wish
-from handeye.planning.prediction import Sight
 from handeye.solving import Estimate
 from handeye.types import View
 from handeye.types.arrays import FloatArray

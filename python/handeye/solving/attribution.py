@@ -18,7 +18,8 @@ from handeye.types.calibration import Finding, Noise, RobotSide
 
 # Logarithm of a factor in likelihood that counts as decisive (Kass and Raftery 1995: "very strong" is 5).
 DECISIVE = 5.0
-# Share, of the misfit or of what the likelihood needs of the robot, of something that can be put right (camera, board, clocks) that makes it worth a word.
+# Share of the misfit, or of what the likelihood needs of the robot, that makes something that can be put
+# right (camera, board, clocks) worth a word.
 CONVINCING_SHARE = 0.3
 # Focal lengths and principal point come first.
 _PARAMETERS_IN_PX = 4
@@ -93,13 +94,11 @@ def noise_of(
     )
 
 
-def _at_flange(
-    noise: StationNoise, measurements: Measurements, arm: ArmModel | None
-) -> tuple[float, float]:
-    """Deviation per axis of the flange's translation (metres) and rotation (radians), on average over views."""
+def _at_flange(noise: StationNoise, measurements: Measurements, arm: ArmModel | None) -> tuple[float, float]:
+    """Deviation per axis of the flange's translation (metres) and rotation (radians), root mean square."""
     positions = np.array([view.T_base_flange.translation for view in measurements.views]).reshape(-1, 3)
     reach = float(np.mean(np.sum(np.square(positions), axis=1)))
-    variances = np.square(noise.flange) + np.square(noise.base)
+    variances: FloatArray = np.square(np.array(noise.flange)) + np.square(np.array(noise.base))
     # |w x p|^2 of a turn w of the base is on average two thirds of |w|^2 |p|^2.
     variances[0] += 2 / 3 * noise.base[1] ** 2 * reach
     if arm is not None:
@@ -172,12 +171,12 @@ def _robot_words(
         return "robot_links", f"{words} {millimetres:.2g} mm and {degrees:.2g} deg"
     side = _SIDES[name].value
     alike = ", alike in like postures" if name in _POSTURE else ", another way at each view"
-    return (
-        f"robot_{side}",
+    words = (
         f"the robot ({side} side) explains the misfit best: its poses are off by about "
         f"{noise.robot_translation_m * 1e3:.2g} mm and {np.rad2deg(noise.robot_rotation_rad):.2g} deg per "
-        f"axis{alike}",
+        f"axis{alike}"
     )
+    return f"robot_{side}", words
 
 
 def _camera_words(shift: FloatArray, measurements: Measurements, prior: CameraPrior) -> str:
@@ -192,7 +191,8 @@ def _camera_words(shift: FloatArray, measurements: Measurements, prior: CameraPr
 
 def _board_words(scale: float) -> str:
     size = "larger" if scale > 0 else "smaller"
-    return f"the size of the board explains the misfit best: it seems {abs(100 * scale):.2g} % {size} than stated"
+    words = f"it seems {abs(100 * scale):.2g} % {size} than stated"
+    return f"the size of the board explains the misfit best: {words}"
 
 
 def _lag_words(theta: FloatArray, posterior: _core.Posterior) -> str:

@@ -1,4 +1,4 @@
-"""The default model: robot, camera and board are known only roughly, all at once, and the views say how roughly.
+"""The default model: robot, camera and board are known only roughly, and the views say how roughly.
 
 One linear mixed model (`handeye-core`, room `estimation`): every view is the pose of the target in its image
 with that pose's covariance; what is constant is a parameter with a prior, what is new at every station is

@@ -1,4 +1,4 @@
-"""What is believed of a camera before its pictures are solved: how well each parameter is known, and from where."""
+"""What is believed of a camera before its pictures are solved: how well it is known, and from where."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,8 @@ from handeye.types.camera import Camera
 DEFAULT_FOCAL_SIGMA = 0.002
 DEFAULT_CENTRE_SIGMA = 0.002
 DEFAULT_DISTORTION_SIGMA = 0.02
-# A lens that was never measured (no coefficients, or all zero): what ordinary lenses are like, k1, k2, p1, p2, k3.
+# A lens that was never measured (no coefficients, or all zero): what ordinary lenses are like, in the order
+# k1, k2, p1, p2, k3.
 UNMEASURED_LENS = "brown_conrady_5"
 UNMEASURED_DISTORTION_SIGMAS = (0.1, 0.1, 0.002, 0.002, 0.1)
 

@@ -8,6 +8,7 @@ import numpy as np
 from handeye import _core
 from handeye.errors import DegenerateError
 from handeye.solving.arm import ArmModel
+from handeye.solving.confidence import Within, within
 from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import (
@@ -50,10 +51,8 @@ class StationNoise:
     joint_rad: float = 0.0
 
     def roots(self, mounting: Mounting) -> tuple[FloatArray | None, FloatArray | None]:
-        """Square roots (6, 6) of the covariances on the left and on the right of A; None where there is none."""
-        flange, base = (
-            isotropic_root(*side) if any(side) else None for side in (self.flange, self.base)
-        )
+        """Square roots (6, 6) of the covariances on the left and on the right of A; None for none."""
+        flange, base = (isotropic_root(*side) if any(side) else None for side in (self.flange, self.base))
         return (flange, base) if mounting is Mounting.EYE_IN_HAND else (base, flange)
 
 
@@ -134,6 +133,11 @@ class Estimate:
     def chain_entropy(self) -> float:
         """Entropy of X and Y alone, in nats: comparable between models with and without camera parameters."""
         return _entropy(self.covariance[:12, :12])
+
+    @property
+    def within_95(self) -> Within:
+        """How far off the answer may be, with 95 % probability."""
+        return within(self.hand_eye_covariance, self.degrees_of_freedom)
 
     @property
     def hand_eye_covariance(self) -> FloatArray:

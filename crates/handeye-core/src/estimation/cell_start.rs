@@ -3,7 +3,8 @@
 use nalgebra::Matrix6;
 
 use super::cell::{Cell, Measurement};
-use super::start::{WeakPrior, start_from_poses};
+use super::start::start_from_poses;
+use super::weak_prior::WeakPrior;
 use crate::error::Error;
 use crate::se3::Se3;
 

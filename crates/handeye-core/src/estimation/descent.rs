@@ -5,9 +5,9 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::start::WeakPrior;
 use super::systems::{eliminate, entries_of, start_of, substitute};
 use super::twists::{exponential, logarithm, product};
+use super::weak_prior::WeakPrior;
 use crate::batched_algebra::{UPPER, load, store, upper};
 use crate::least_squares::through_chain;
 use crate::se3::Se3;

@@ -6,7 +6,8 @@
 /// never shows costs more and more. No level is kept away from zero, and none has an end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LevelPrior {
-    /// A deviation `s` of density `s^exponent exp(-s / size)` in its logarithm, down to where it is nothing.
+    /// A deviation `s` of density `s^exponent / (1 + s / size)^2` in its logarithm, down to where it is nothing: rare
+    /// beyond its size, and nowhere impossible.
     Deviation {
         /// Where sizes become rare, in the unit of the level.
         size: f64,
@@ -33,6 +34,8 @@ pub struct Level {
     pub prior: LevelPrior,
 }
 
+/// Power by which levels beyond their size become rare.
+const TAIL: f64 = 2.0;
 /// How sharply a level ends where it is nothing, in its logarithm.
 const WALL: f64 = 0.5;
 
@@ -54,11 +57,12 @@ impl Level {
             }
             LevelPrior::Deviation { size, exponent, nothing } => {
                 let relative = t.exp() / size;
+                let share = relative / (1.0 + relative);
                 let below = (nothing.ln() - t).max(0.0) / WALL;
                 (
-                    relative - exponent * t + 0.5 * below * below,
-                    relative - exponent - below / WALL,
-                    relative + if below > 0.0 { WALL.powi(-2) } else { 0.0 },
+                    TAIL * relative.ln_1p() - exponent * t + 0.5 * below * below,
+                    TAIL * share - exponent - below / WALL,
+                    TAIL * share / (1.0 + relative) + if below > 0.0 { WALL.powi(-2) } else { 0.0 },
                 )
             }
         }

@@ -14,41 +14,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::components::Component;
+use super::component::Component;
+pub(super) use super::component::{Effect, Term};
 use super::levels::Level;
 use super::linearisation::Linearisation;
 use crate::positive::Factor;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
-
-/// What a component does, and the levels whose product is its deviation.
-#[derive(Clone, Debug)]
-pub(super) struct Term {
-    /// Its component's levels that are multiplied.
-    pub levels: Vec<usize>,
-    /// What it does.
-    pub effect: Effect,
-}
-
-/// What a component does at a deviation of one.
-#[derive(Clone, Debug)]
-pub(super) enum Effect {
-    /// New at every station: roots of its covariance, one per station.
-    Noise(Vec<DMatrix<f64>>),
-    /// The same at all stations: columns of new parameters, one matrix per station.
-    Constant(Vec<DMatrix<f64>>),
-    /// As `Constant`, but what all stations share of it cannot be told from the poses and comes again whenever the arm
-    /// works: the answer is given as if it were new at every station, and its covariance is as it is.
-    Recurring(Vec<DMatrix<f64>>),
-    /// A prior on parameters that are there already.
-    Prior {
-        /// First of them.
-        first: usize,
-        /// Information at a deviation of one.
-        information: DMatrix<f64>,
-        /// Mean.
-        mean: DVector<f64>,
-    },
-}
 
 /// A prior on parameters.
 struct Prior {
@@ -63,6 +34,12 @@ struct Prior {
 }
 
 impl Prior {
+    /// Of new parameters with columns of their own, whose place is not known yet.
+    fn of_columns(of: &'static str, levels: Vec<usize>, columns: &[DMatrix<f64>], recurring: bool) -> Self {
+        let count = columns.first().map_or(0, DMatrix::ncols);
+        Self { of, levels, first: 0, count, information: None, mean: None, recurring }
+    }
+
     fn range(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.count
     }
@@ -148,7 +125,7 @@ impl Mixed {
         let mut levels = Vec::new();
         let mut owners = Vec::new();
         let (mut noises, mut priors, mut constants) = (Vec::new(), Vec::new(), Vec::new());
-        let mut blocks: Vec<(bool, &'static str, Vec<usize>, Vec<DMatrix<f64>>)> = Vec::new();
+        let mut blocks: Vec<(Prior, Vec<DMatrix<f64>>)> = Vec::new();
         for component in components {
             let first = levels.len();
             levels.extend(component.levels());
@@ -157,8 +134,12 @@ impl Mixed {
                 let of: Vec<usize> = term.levels.iter().map(|l| first + l).collect();
                 match term.effect {
                     Effect::Noise(roots) => noises.push(Noise { of: component.name(), levels: of, roots }),
-                    Effect::Constant(columns) => blocks.push((false, component.name(), of, columns)),
-                    Effect::Recurring(columns) => blocks.push((true, component.name(), of, columns)),
+                    Effect::Constant(columns) => {
+                        blocks.push((Prior::of_columns(component.name(), of, &columns, false), columns));
+                    }
+                    Effect::Recurring(columns) => {
+                        blocks.push((Prior::of_columns(component.name(), of, &columns, true), columns));
+                    }
                     Effect::Prior { first, information, mean } => priors.push(Prior {
                         of: component.name(),
                         levels: of,
@@ -172,24 +153,15 @@ impl Mixed {
             }
         }
         // Recurring parameters come last: the answer does not name them.
-        blocks.sort_by_key(|(recurring, ..)| *recurring);
+        blocks.sort_by_key(|(prior, _)| prior.recurring);
         let poses = linearisation.information.nrows();
         let mut size = poses;
         let mut told = poses;
-        for (recurring, name, of, columns) in &blocks {
-            let count = columns.first().map_or(0, DMatrix::ncols);
-            priors.push(Prior {
-                of: name,
-                levels: of.clone(),
-                first: size,
-                count,
-                information: None,
-                mean: None,
-                recurring: *recurring,
-            });
-            constants.push((*name, size..size + count));
-            size += count;
-            if !recurring {
+        for (prior, _) in &mut blocks {
+            prior.first = size;
+            constants.push((prior.of, prior.range()));
+            size += prior.count;
+            if !prior.recurring {
                 told = size;
             }
         }
@@ -206,7 +178,7 @@ impl Mixed {
                         *entry = from.b[(r, j)];
                     }
                     let mut at = poses;
-                    for (_, _, _, columns) in &blocks {
+                    for (_, columns) in &blocks {
                         for j in 0..columns[k].ncols() {
                             row[at] = columns[k][(r, j)];
                             at += 1;
@@ -217,6 +189,7 @@ impl Mixed {
                 Station { size: rows_of, rows, pixels: from.pixels.clone() }
             })
             .collect();
+        priors.extend(blocks.into_iter().map(|(prior, _)| prior));
         let mut given = DMatrix::zeros(size, size);
         let mut given_right = DVector::zeros(size);
         given.view_mut((0, 0), (poses, poses)).copy_from(&(&linearisation.information + weak.0));
@@ -279,7 +252,7 @@ impl Mixed {
             }
         }
         for (p, s) in self.priors.iter().zip(&prior) {
-            constant += self.add_prior(p, *s, &mut information, &mut right);
+            constant += Self::add_prior(p, *s, &mut information, &mut right);
         }
         let factor = Factor::new(&information)?;
         let theta = DVector::from_vec(factor.solve(right.as_slice()));
@@ -315,7 +288,7 @@ impl Mixed {
     }
 
     /// Adds a prior at deviation `s`; what it adds to twice the value.
-    fn add_prior(&self, p: &Prior, s: f64, information: &mut DMatrix<f64>, right: &mut DVector<f64>) -> f64 {
+    fn add_prior(p: &Prior, s: f64, information: &mut DMatrix<f64>, right: &mut DVector<f64>) -> f64 {
         let weight = s.powi(-2);
         let mut constant = 2.0 * p.count as f64 * s.ln();
         match &p.information {
@@ -478,7 +451,7 @@ impl Mixed {
         let mut information = self.given.view((0, 0), (p, p)).into_owned();
         let mut right = self.given_right.rows(0, p).into_owned();
         for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| !q.recurring) {
-            self.add_prior(q, *s, &mut information, &mut right);
+            Self::add_prior(q, *s, &mut information, &mut right);
         }
         let recurring = self.size - p;
         let mut scales = vec![0.0; recurring];
@@ -584,7 +557,9 @@ impl Mixed {
                 add(p.of, moved.norm_squared());
             }
         }
-        sums.iter_mut().for_each(|(_, sum)| *sum /= rows as f64);
+        for (_, sum) in &mut sums {
+            *sum /= rows as f64;
+        }
         Some(sums)
     }
 }

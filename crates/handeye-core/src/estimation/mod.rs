@@ -12,6 +12,7 @@
 
 mod cell;
 mod cell_start;
+mod component;
 mod components;
 mod descent;
 mod levels;
@@ -24,6 +25,7 @@ mod start;
 mod systems;
 mod twists;
 mod view_sets;
+mod weak_prior;
 
 pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station};
 pub use cell_start::{CellStart, start_of_cell};
@@ -31,5 +33,6 @@ pub use components::Assumptions;
 pub use levels::{Level, LevelPrior};
 pub use pose_measurement::{PoseMeasurement, compress, shrunk_variances};
 pub use posterior::{Attribution, Node, Options, Posterior, estimate};
-pub use start::{ChainStart, WeakPrior, start_from_poses};
+pub use start::{ChainStart, start_from_poses};
 pub use view_sets::{LinearisedView, NoiseLevel, SetFit, ViewSets};
+pub use weak_prior::WeakPrior;

@@ -3,11 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::cell::Cell;
-use super::components::{self, Assumptions, Component};
+use super::component::Component;
+use super::components::{self, Assumptions};
 use super::linearisation::{Guess, linearise};
 use super::mixed::{Evaluation, Mixed, Wanted};
 use super::nodes;
-use super::start::WeakPrior;
+use super::weak_prior::WeakPrior;
 use crate::error::Error;
 use crate::se3::Se3;
 

@@ -9,7 +9,7 @@ import numpy as np
 from handeye.evaluation import metrics
 from handeye.evaluation.parallel import Progress, Workers, run_all
 from handeye.evaluation.protocol import true_hand_eye
-from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate, simulated_arm
+from handeye.evaluation.simulate import MIXTURES, CellOptions, ErrorKind, simulate, simulated_arm
 from handeye.robots import ArmKinematics
 from handeye.solving import Measurements, make_estimator
 from handeye.types.calibration import MM_PER_M, ModelName
@@ -19,18 +19,11 @@ RUNS_PER_PIECE = 10
 
 @dataclass(frozen=True)
 class Case:
-    """A kind of error, and whether the arm's kinematics are known to the estimate.
-
-    Parameters
-    ----------
-    modelled
-        Whether the default model has a hypothesis of just this kind; without, it can only be careful.
-    """
+    """A kind of error, and whether the arm's kinematics are known to the estimate."""
 
     name: str
     kind: ErrorKind
     arm_known: bool = False
-    modelled: bool = True
 
 
 CASES = (
@@ -39,11 +32,18 @@ CASES = (
     Case("white_base", ErrorKind.WHITE_BASE),
     Case("encoder", ErrorKind.ENCODER, arm_known=True),
     Case("joint_offsets", ErrorKind.JOINT_OFFSETS, arm_known=True),
-    Case("smooth_kinematic", ErrorKind.SMOOTH_KINEMATIC, modelled=False),
-    Case("wrong_intrinsics", ErrorKind.WRONG_INTRINSICS, modelled=False),
-    Case("encoder_arm_unknown", ErrorKind.ENCODER, modelled=False),
-    Case("joint_offsets_arm_unknown", ErrorKind.JOINT_OFFSETS, modelled=False),
+    Case("smooth_kinematic", ErrorKind.SMOOTH_KINEMATIC),
+    Case("wrong_intrinsics", ErrorKind.WRONG_INTRINSICS),
+    Case("encoder_arm_unknown", ErrorKind.ENCODER),
+    Case("joint_offsets_arm_unknown", ErrorKind.JOINT_OFFSETS),
     Case("smooth_kinematic_arm_known", ErrorKind.SMOOTH_KINEMATIC, arm_known=True),
+    *(Case(kind.value, kind, arm_known=True) for kind in MIXTURES),
+    *(Case(f"{kind.value}_arm_unknown", kind) for kind in MIXTURES),
+    Case("same_pictures", ErrorKind.SAME_PICTURES),
+    Case("board_scale_0_1_percent", ErrorKind.BOARD_SCALE),
+    Case("focal_0_3_percent", ErrorKind.FOCAL),
+    Case("pixel_field", ErrorKind.PIXEL_FIELD),
+    Case("robot_noise_1_deg", ErrorKind.ROBOT_NOISE_1_DEG),
 )
 
 
@@ -92,7 +92,6 @@ def _kind(case: Case, runs: Sequence[Run]) -> dict[str, Any]:
         "rotation_deg": float(np.mean([run.rotation_deg for run in runs])),
         "sigma_translation_mm": float(np.mean([run.sigma_translation_mm for run in runs])),
         "arm_known": case.arm_known,
-        "modelled": case.modelled,
         "trials": len(runs),
     }
 

@@ -7,8 +7,8 @@ use crate::camera::{Camera, Feature, Lens};
 use crate::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, ToolPoint, Trace,
 };
-use crate::information::{Belief, CandidateModel, Execution, Motions, Supposition, Visibility};
-use crate::least_squares::{PixelParameters, Side};
+use crate::information::{Belief, CandidateModel, Execution, Motions, RobotError, Supposition, Visibility};
+use crate::least_squares::PixelParameters;
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
 use crate::testing::Random;
@@ -197,7 +197,7 @@ proptest! {
         let random = &mut Random::new(seed);
         let mut scene = Scene::new(random, lens, count, scattered, 0.0);
         scene.robot = match noisy {
-            0 => None,
+            0 => RobotError::default(),
             1 => RobotError::on_left(robot_root(random)),
             _ => RobotError::on_right(robot_root(random)),
         };
@@ -247,7 +247,7 @@ proptest! {
         let random = &mut Random::new(seed);
         let mut scene = Scene::new(random, lens, 37, false, radius);
         scene.robot = match noisy {
-            0 => None,
+            0 => RobotError::default(),
             1 => RobotError::on_left(robot_root(random)),
             _ => RobotError::on_right(robot_root(random)),
         };

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from folders import made_recording
-from handeye.evaluation.region import position_region
 from handeye.solving import solve
+from handeye.solving.confidence import position_region
 from handeye.types.calibration import Calibration
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy import special, stats
 
 from handeye.errors import InputError
-from handeye.evaluation.f_distribution import f_cumulative, f_quantile, regularised_incomplete_beta
+from handeye.solving.f_distribution import f_cumulative, f_quantile, regularised_incomplete_beta
 
 
 @pytest.mark.parametrize("numerator", [1, 3, 6, 12])
