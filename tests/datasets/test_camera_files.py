@@ -179,3 +179,35 @@ def test_what_is_no_camera_is_named(name: str, text: str, words: str, tmp_path: 
     with pytest.raises(InputError, match=words) as caught:
         read_camera(tmp_path / name)
     assert str(tmp_path / name) in caught.value.message
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_cameras_of_all_kinds_read_back(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    width, height = (int(v) for v in rng.integers(100, 5000, 2))
+    fx, fy, cx, cy = rng.uniform(0.5, 2, 4).round(3) * [width, width, width / 2, height / 2]
+    fisheye = bool(seed % 4 == 3)
+    count = 4 if fisheye else (4, 5, 8)[seed % 3]
+    distortion = rng.normal(0, 0.05, count)
+    matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    expected = Camera.from_opencv(matrix, distortion, (width, height), fisheye=fisheye)
+    model = "equidistant" if fisheye else "rational_polynomial" if count == 8 else "plumb_bob"
+    rows = ", ".join(map(repr, matrix.ravel().tolist()))
+    numbers = ", ".join(map(repr, distortion.tolist()))
+    (tmp_path / "info.yaml").write_text(
+        f"image_width: {width}\nimage_height: {height}\ncamera_matrix: {{data: [{rows}]}}\n"
+        f"distortion_model: {model}\ndistortion_coefficients: {{data: [{numbers}]}}\n"
+    )
+    (tmp_path / "echo.yaml").write_text(
+        f"height: {height}\nwidth: {width}\ndistortion_model: {model}\nd: [{numbers}]\nk: [{rows}]\n---\n"
+    )
+    storage = cv2.FileStorage(str(tmp_path / "storage.yml"), cv2.FILE_STORAGE_WRITE)
+    for key, value in (("image_width", width), ("image_height", height), ("fisheye", int(fisheye))):
+        storage.write(key, value)
+    storage.write("camera_matrix", matrix)
+    storage.write("distortion_coefficients", distortion)
+    storage.release()
+    for name in ("info.yaml", "echo.yaml", "storage.yml"):
+        found = read_camera(tmp_path / name)
+        assert (found.lens, found.size_px) == (expected.lens, expected.size_px), name
+        np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-12)
