@@ -414,6 +414,9 @@ class PoseMeasurements:
     def variances_px2(self) -> list[float]: ...
     @property
     def covariances(self) -> NDArray[float64]: ...
+    def shared_error(self, variances_px2: list[float]) -> float:
+        """Factor on the variances for errors that neighbouring points share; one where there are none."""
+
     def shrunk_variances(self, *, prior_degrees: float, floor_px2: float) -> list[float]:
         """Pixel variance of each view, drawn to their median, px^2."""
 

@@ -2,7 +2,8 @@
 
 use handeye_core::estimation::{
     Assumptions, Body, CameraPrior, Cell, Measurement, Options, PoseMeasurement, Posterior as CorePosterior,
-    SeenBy, Station, WeakPrior, compress, estimate, shrunk_variances, start_from_poses, start_of_cell,
+    SeenBy, Station, WeakPrior, compress, estimate, shared_error, shrunk_variances, start_from_poses,
+    start_of_cell,
 };
 use handeye_core::least_squares::PixelParameters;
 use handeye_core::se3::Se3;
@@ -119,6 +120,12 @@ impl PoseMeasurements {
     #[getter]
     fn covariances<'py>(&self, py: Python<'py>) -> Floats<'py> {
         convert::matrices_out(py, &self.views.iter().map(|v| v.covariance).collect::<Vec<_>>())
+    }
+
+    /// Factor on the pixel variances for errors that neighbouring points share; one where there are none.
+    fn shared_error(&self, variances_px2: Vec<f64>) -> f64 {
+        let views: Vec<_> = self.views.iter().map(|v| v.slow).zip(variances_px2).collect();
+        shared_error(&views)
     }
 
     /// Pixel variance of each view, shrunk towards their median, px^2.

@@ -27,6 +27,7 @@ def solve(
     *,
     model: ModelName = ModelName.AUTO,
     reduced: bool = False,
+    camera_fixed: bool = False,
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
@@ -47,6 +48,8 @@ def solve(
         auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
     reduced
         Answer even where the views leave directions open, such as for an arm with four axes.
+    camera_fixed
+        Hold the camera as it is given. Else its parameters are found again within what is known of them.
     output
         Also write the JSON object to this file.
     """
@@ -56,7 +59,7 @@ def solve(
         return answer_for_poses(opened, output)
     with mindful_of(opened.warnings):
         kinematics = arm.kinematics(opened.recording, model)
-        calibration = solve_recording(opened.recording, model, reduced=reduced, kinematics=kinematics)
+        calibration = solve_recording(opened.recording, model, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed)
     region = position_region(calibration)
     data = _data(opened, calibration, region)
     if output is not None:

@@ -118,13 +118,21 @@ class Prediction:
         return self.predicted(after)
 
     def predicted(self, after: FloatArray) -> FloatArray:
-        """Covariances (..., 6, 6) of X after views that leave these by the information alone."""
-        estimate = self.estimate
-        before, whole = self._belief.covariance[:6, :6], estimate.hand_eye_covariance
-        if estimate.arm is None and not _is_proportional(before, whole):
-            return after + _positive(whole - before)
-        root = np.linalg.cholesky(whole) @ np.linalg.inv(np.linalg.cholesky(before))
-        return root @ after @ root.T
+        """Covariances (..., 6, 6) of X after views that leave these by the information alone.
+
+        In units of what the information leaves before them, the covariance of the estimate has values above
+        one along some axes. Where the arm is not described that excess is what comes again in every view, and
+        stays; elsewhere it is what is not known of the noise, and falls with the rest.
+        """
+        before, whole = self._belief.covariance[:6, :6], self.estimate.hand_eye_covariance
+        root = np.linalg.cholesky(before)
+        inverse = np.linalg.inv(root)
+        values, axes = np.linalg.eigh(inverse @ whole @ inverse.T)
+        kept = np.maximum(values - 1.0, 0.0) if self.estimate.arm is None else np.zeros(6)
+        scale = np.sqrt(np.maximum(values - kept, 0.0))
+        relative = axes.T @ inverse @ after @ inverse.T @ axes
+        back = root @ axes
+        return back @ (scale[:, np.newaxis] * relative * scale + np.diag(kept)) @ back.T
 
     def _arm(self, joints: FloatArray | None) -> tuple[FloatArray, FloatArray] | None:
         arm = self.estimate.arm
@@ -175,16 +183,6 @@ def _sigma_points(estimate: Estimate) -> list[tuple[Pose, Pose]]:
             (Pose.exp(signed[:6]) @ estimate.X, Pose.exp(signed[6:]) @ estimate.Y) for signed in (step, -step)
         ]
     return points
-
-
-def _is_proportional(first: FloatArray, second: FloatArray) -> bool:
-    return np.allclose(first / np.trace(first), second / np.trace(second), rtol=1e-6, atol=1e-12)
-
-
-def _positive(matrix: FloatArray) -> FloatArray:
-    """Return the positive semidefinite part of a symmetric matrix (6, 6)."""
-    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
-    return (vectors * np.maximum(values, 0.0)) @ vectors.T
 
 
 def _hand_eye_covariance(information: FloatArray) -> FloatArray:

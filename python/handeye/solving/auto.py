@@ -95,8 +95,11 @@ class AutoEstimator:
             board_scale=True,
         )
         variances = seen.shrunk_variances(prior_degrees=PIXEL_PRIOR_DEGREES, floor_px2=LEAST_PIXEL_SIGMA**2)
-        posterior = self._posterior(measurements, prior, arm, (seen, variances), previous)
-        return _estimate(measurements, prior, arm, posterior, np.sqrt(variances))
+        shared = seen.shared_error(variances)
+        posterior = self._posterior(
+            measurements, prior, arm, (seen, [shared * variance for variance in variances]), previous
+        )
+        return _estimate(measurements, prior, arm, posterior, np.sqrt(variances), float(np.sqrt(shared)))
 
     def _posterior(
         self,
@@ -134,13 +137,14 @@ def _estimate(
     arm: ArmModel | None,
     posterior: _core.Posterior,
     sigma_px: FloatArray,
+    shared: float,
 ) -> Estimate:
     theta = np.asarray(posterior.theta)
     parameters = np.array(prior.camera.parameters)
     first = 12 + len(prior.free)
     parameters[list(prior.free)] += theta[12:first]
     X, Y = Pose(posterior.x[0]), Pose(posterior.y[0])
-    noise = noise_of(posterior, measurements, arm, sigma_px)
+    noise = replace(noise_of(posterior, measurements, arm, sigma_px), pixel_shared=shared)
     levels = Levels.of(posterior)
     constants, of_constants = arm_constants(posterior)
     correction = None if arm is None else arm.correction(constants)
@@ -163,7 +167,7 @@ def _estimate(
         start=posterior.origin,
         ending="converged_average" if at_rest else "iteration_limit",
         iterations=rounds,
-        candidate_sigma_px=float(np.median(sigma_px)),
+        candidate_sigma_px=shared * float(np.median(sigma_px)),
         station_noise=levels.station_noise(),
         free_camera=prior.free,
         board_scale=float(theta[first]),

@@ -55,10 +55,12 @@ class Noise:
     how
         How the levels were found, in one line.
     evidence
-        Posterior probability of each side that was compared.
+        Share of each side in the misfit that the robot explains; all of it at `none` where it is exact.
+    pixel_shared
+        By what factor the pixels' deviation counts for more as neighbouring points err alike; 1 if they do not.
     smooth_probability
-        Posterior probability that the robot's error changes smoothly with its posture, not from view to
-        view; the covariance counts that, and grows.
+        Share of what changes smoothly with the posture of an arm that is not described, not from view to
+        view; the covariance counts it, and grows.
     """
 
     pixel_sigma_px: tuple[float, ...]
@@ -69,6 +71,7 @@ class Noise:
     evidence: dict[str, float] = field(default_factory=dict[str, float])
     joint_rad: float = 0.0
     smooth_probability: float = 0.0
+    pixel_shared: float = 1.0
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON, with units in the keys."""
@@ -83,6 +86,7 @@ class Noise:
             "how": self.how,
             "evidence": dict(self.evidence),
             "smooth_probability": self.smooth_probability,
+            "pixel_shared": self.pixel_shared,
         }
 
 

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
+use super::pixel_field::{SlowResiduals, slow_residuals};
 use crate::camera::Camera;
 use crate::error::Error;
 use crate::least_squares::{PixelParameters, Problem, view_block};
@@ -29,6 +30,8 @@ pub struct PoseMeasurement {
     pub variance_px2: f64,
     /// Degrees of freedom behind that variance.
     pub degrees_of_freedom: f64,
+    /// The slow part of the residual.
+    pub slow: SlowResiduals,
 }
 
 /// Compresses a view at the pose that fits its image.
@@ -70,6 +73,7 @@ pub fn compress(
         camera_gradient,
         variance_px2: block.squared_px / degrees_of_freedom.max(1.0),
         degrees_of_freedom,
+        slow: slow_residuals(problem, k, camera, pose, parameters),
     })
 }
 

@@ -11,13 +11,13 @@ from handeye.solving.mistakes.relabel import Readings
 from handeye.solving.mistakes.sightings import Sightings
 from handeye.types.arrays import IndexArray
 
-# An explanation that needs no other: at least so many views belong, and the robot (metres, radians) is no
-# worse.
-CONVINCING_SHARE = 0.75
-CONVINCING_LEVELS = (4e-3, float(np.deg2rad(0.4)))
-# One that stands at all.
+# An explanation that needs no other: all views belong, and the robot (metres, radians) is no worse. A wrong
+# reading of the poses can make three of four views agree to a few millimetres.
+CONVINCING_SHARE = 1.0
+CONVINCING_LEVELS = (2e-3, float(np.deg2rad(0.2)))
+# One that stands at all: beyond, no arm that works errs, and a wrong reading of the poses fits as well.
 BEARABLE_SHARE = 0.5
-BEARABLE_LEVELS = (0.04, float(np.deg2rad(1.5)))
+BEARABLE_LEVELS = (0.015, float(np.deg2rad(1.5)))
 # Few views agree by chance sooner: more is asked of them.
 FEW_VIEWS = 5
 FEW_LEVELS = (1e-3, float(np.deg2rad(0.1)))
