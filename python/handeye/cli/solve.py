@@ -59,7 +59,9 @@ def solve(
         return answer_for_poses(opened, output)
     with mindful_of(opened.warnings):
         kinematics = arm.kinematics(opened.recording, model)
-        calibration = solve_recording(opened.recording, model, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed)
+        calibration = solve_recording(
+            opened.recording, model, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed
+        )
     region = position_region(calibration)
     data = _data(opened, calibration, region)
     if output is not None:

@@ -18,9 +18,9 @@ from handeye.types.calibration import Finding, Noise, RobotSide
 
 # Logarithm of a factor in likelihood that counts as decisive (Kass and Raftery 1995: "very strong" is 5).
 DECISIVE = 5.0
-# Share of the misfit, or of what the likelihood needs of the robot, that makes something that can be put
-# right (camera, board, clocks) worth a word.
-CONVINCING_SHARE = 0.3
+# Something that can be put right (camera, board, clocks) is worth a word at this share of the misfit, or of
+# what the likelihood would lose with an exact robot.
+CONVINCING_SHARE, NEEDED_SHARE = 0.3, 0.15
 # Focal lengths and principal point come first.
 _PARAMETERS_IN_PX = 4
 _SIDES = {
@@ -130,10 +130,7 @@ def attribution(
         name
         for name in ("camera", "board_scale", "time_lag")
         if evidence.get(name, 0.0) > DECISIVE
-        and (
-            misfit[name] > CONVINCING_SHARE * total
-            or evidence[name] > CONVINCING_SHARE * posterior.robot_loss
-        )
+        and (misfit[name] > CONVINCING_SHARE * total or evidence[name] > NEEDED_SHARE * posterior.robot_loss)
     ]
     if causes:
         cause = max(causes, key=lambda name: evidence[name])
