@@ -1,1 +1,79 @@
-"""Hand-eye calibration: which view to take next, when to stop, and how far its answer can be trusted."""
+"""Hand-eye calibration: which view to take next, when to stop, and how far its answer can be trusted.
+
+>>> import handeye
+>>> opened = handeye.open_folder("my_folder")            # pictures and poses, or a recording
+>>> calibration = handeye.solve(opened.recording)
+>>> calibration.results["T_flange_camera"]
+
+What is named here is imported when it is first used, so `import handeye` itself costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from handeye.datasets import read_camera, read_recording, read_target, write_recording
+    from handeye.detection import detect
+    from handeye.errors import HandeyeError
+    from handeye.importing import SourceOptions, open_folder
+    from handeye.planning import plan
+    from handeye.solving import solve
+    from handeye.types import Camera, Mounting, Pose, Recording, Target, View
+
+    __version__: str
+
+_PLACES = {
+    "Camera": "types",
+    "HandeyeError": "errors",
+    "Mounting": "types",
+    "Pose": "types",
+    "Recording": "types",
+    "SourceOptions": "importing",
+    "Target": "types",
+    "View": "types",
+    "detect": "detection",
+    "open_folder": "importing",
+    "plan": "planning",
+    "read_camera": "datasets",
+    "read_recording": "datasets",
+    "read_target": "datasets",
+    "solve": "solving",
+    "write_recording": "datasets",
+}
+
+__all__ = [
+    "Camera",
+    "HandeyeError",
+    "Mounting",
+    "Pose",
+    "Recording",
+    "SourceOptions",
+    "Target",
+    "View",
+    "__version__",
+    "detect",
+    "open_folder",
+    "plan",
+    "read_camera",
+    "read_recording",
+    "read_target",
+    "solve",
+    "write_recording",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name == "__version__":
+        from importlib.metadata import version  # noqa: PLC0415 - rarely asked for
+
+        value: object = version("handeye")
+    elif name in _PLACES:
+        value = getattr(import_module(f"handeye.{_PLACES[name]}"), name)
+    else:
+        raise AttributeError(f"module 'handeye' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -64,6 +64,22 @@ class InputError(HandeyeError):
     default_code = "invalid_input"
 
 
+class UnstatedError(InputError):
+    """The files leave open what the robot's poses mean.
+
+    Attributes
+    ----------
+    options
+        Options of the command line that say what the pictures agree with; empty where they do not tell.
+    """
+
+    default_code = "notation_unstated"
+
+    def __init__(self, message: str, *, hint: str, options: tuple[str, ...] = ()) -> None:
+        super().__init__(message, hint=hint)
+        self.options = options
+
+
 class DegenerateError(HandeyeError):
     """The views leave directions of the answer undetermined."""
 

@@ -175,3 +175,18 @@ def test_interrupted_process_ends_with_130(tmp_path: Path) -> None:
     code = "import handeye.cli.boundary as b\n" + "def app(named):\n    raise KeyboardInterrupt\n"
     code += "b.make_app = app\nraise SystemExit(b.run([]))"
     assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 130
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("slove", "solve"), ("valdate", "validate"), ("improt", "import")]
+)
+def test_a_slip_of_the_fingers_is_understood(handeye: Handeye, typed: str, meant: str) -> None:
+    error = handeye.fails(typed, "folder")
+    assert error["code"] == "usage"
+    assert error["hint"].startswith(f"did you mean {meant}?")
+    assert "did you mean" not in handeye.fails("xyzzy")["hint"]
+
+
+def test_help_is_a_command_too(handeye: Handeye) -> None:
+    assert "solve" in handeye("help").out
+    assert "--notation" in handeye("help", "solve").out

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from datasets.layouts import RCT_FILES, some_recording, write_rct, write_rwhe
-from handeye.datasets import load, read_poses_csv, read_recording, write_recording
+from handeye.datasets import load, read_poses, read_recording, write_recording
 from handeye.errors import InputError
 from strategies import mutated
 
@@ -80,7 +80,7 @@ def test_poses(tmp_path: Path, data: st.DataObject) -> None:
     good = b"name,x,y,z,qx,qy,qz,qw\na,1,2,3,0,0,0,1\nb,0.1,0.2,0.3,0.6,0,0,0.8\n"
     path.write_bytes(data.draw(mutated(good, WORDS) | st.binary(max_size=300)))
     try:
-        table = read_poses_csv(path)
+        table = read_poses(path)
     except InputError:
         return
     assert len(table.names) == len(table.poses) > 0

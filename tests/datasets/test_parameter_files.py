@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handeye.datasets.parameter_files import read_camera, read_target
+from handeye.datasets import read_camera, read_target
 from handeye.errors import InputError
 from handeye.types import Camera, Charuco, Target
 
@@ -80,12 +80,13 @@ def test_target(tmp_path: Path) -> None:
         ("a.json", "[1]", "invalid_field"),
         ("a.json", '{"camera": {"lens": "pinhole", "parameters": [NaN, 1, 2, 3], "width_px": 4, "height_px": 5}}', "not_finite"),
         ("a.yaml", "a: [", "not_yaml"),
-        ("a.yaml", "image_width: 3", "invalid_field"),
+        ("a.yaml", "image_width: 3", "unknown_format"),
         ("a.yaml", CAMERA_INFO.replace("MODEL", "mirror").replace("COEFFICIENTS", "0"), "unknown_lens"),
         ("a.yaml", CAMERA_INFO.replace("MODEL", "plumb_bob").replace("COEFFICIENTS", "0"), "unknown_lens"),
-        ("a.yaml", CAMERA_INFO.replace("COEFFICIENTS", "0, zero"), "invalid_field"),
+        ("a.yaml", CAMERA_INFO.replace("COEFFICIENTS", "0, zero"), "not_numbers"),
         ("a.yaml", CAMERA_INFO.replace("240.0, 0.0, 0.0, 1.0]", "240.0]").replace("MODEL", "plumb_bob").replace("COEFFICIENTS", "0"), "wrong_shape"),
-        ("a.ini", "", "unknown_format"),
+        ("a.ini", "", "invalid_field"),
+        ("a.png", "", "unknown_format"),
     ],
 )  # fmt: skip
 def test_hostile_cameras(tmp_path: Path, name: str, text: str, code: str) -> None:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 
 from datasets.layouts import SIZE, everything_below, names_in, png, some_recording
-from handeye.datasets import read_recording, write_recording
+from handeye.datasets import check_written, read_recording, write_recording
 from handeye.errors import InputError, OutputError
 from handeye.types import Mounting, Recording, View
 from strategies import recordings
@@ -268,3 +268,18 @@ def test_plausible_millimetres_are_a_warning(folder: Path) -> None:
     loaded = read_recording(folder)
     assert {warning.code for warning in loaded.warnings} >= {"target_not_metres"}
     assert loaded.recording.camera.size_px == SIZE
+
+
+def test_what_was_written_is_compared(tmp_path: Path) -> None:
+    recording = some_recording()
+    write_recording(recording, tmp_path / "set")
+    check_written(recording, tmp_path / "set")
+    with pytest.raises(OutputError, match="does not read back as it was written"):
+        check_written(recording.select(["im_0", "im_1"]), tmp_path / "set")
+    corners = tmp_path / "set" / "corners" / "im_1.csv"
+    corners.write_text(corners.read_text().replace(".", ".1", 1))
+    with pytest.raises(OutputError, match="does not read back as it was written"):
+        check_written(recording, tmp_path / "set")
+    corners.unlink()
+    with pytest.raises(OutputError, match="does not read back"):
+        check_written(recording, tmp_path / "set")

@@ -7,8 +7,8 @@ import pytest
 
 from commands import Handeye
 from folders import made_recording, written
+from handeye.notations import NOTATIONS, read_pose_text
 from handeye.robots import open_arm
-from handeye.robots.notations import Notation, read_pose_text
 
 QUICK = ("--points-only", "0.1", "--seed", "5")
 LOOSE = ("--accuracy-mm", "5", "--accuracy-deg", "0.5")
@@ -56,7 +56,7 @@ def test_a_dry_run_moves_and_writes_nothing(handeye: Handeye, tmp_path: Path) ->
         assert np.allclose(reached, goal["T_base_flange"], atol=1e-6)
     text = handeye("run", "--dry-run").out
     line = next(line for line in text.splitlines() if line.strip().startswith("fanuc"))
-    assert read_pose_text(line.split("fanuc")[1], Notation.FANUC).translation[2] > 0.2
+    assert read_pose_text(line.split("fanuc")[1], NOTATIONS["fanuc"]).translation[2] > 0.2
 
 
 @pytest.mark.parametrize(

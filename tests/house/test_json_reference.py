@@ -10,11 +10,13 @@ import cv2
 import pytest
 
 from commands import Handeye
+from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
 from handeye.datasets.shipped import shipped_recording
 from handeye.datasets.toml_text import toml_text
+from handeye.evaluation import example_folder
 from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
-from handeye.types import Charuco
+from handeye.types import Charuco, Mounting
 from scenes import scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -89,6 +91,18 @@ def test_solve(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
         handeye.json("solve", open_directions, "--reduced"),
         handeye.json("solve", of_arm, "--robot", "ur5e"),
     )
+
+
+def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
+    path = tmp_path / "demo.samples"
+    path.write_text(easy_samples(Mounting.EYE_IN_HAND))
+    answer = handeye.json("solve", path, "--mounting", "eye_in_hand")
+    compare("handeye solve, poses alone", answer)
+
+
+def test_demo_of_a_folder(handeye: Handeye, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(example_folder, "VIEWS", 2)
+    compare("handeye demo --folder", handeye.json("demo", "--folder", tmp_path / "pictures"))
 
 
 def test_plan(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from handeye.errors import DeviceError
+from handeye.notations import NOTATIONS, SHOWN, pose_text
 from handeye.robots import open_arm
 from handeye.robots.manual import ManualRobot, describe, joints_of_numbers
-from handeye.robots.notations import Notation, pose_numbers, pose_text
 from handeye.robots.protocol import Goal
 from handeye.types import Pose
 
@@ -21,7 +21,7 @@ DEGREES = " ".join(f"{value:.4f}" for value in np.rad2deg(JOINTS))
 
 def pendant() -> str:
     """Return the pose as a UR's pendant shows it: millimetres and a rotation vector in radians."""
-    x, y, z, rx, ry, rz = pose_numbers(POSE, Notation.UR)
+    x, y, z, rx, ry, rz = NOTATIONS["ur"].numbers(POSE)
     return f"{1e3 * x:.2f} {1e3 * y:.2f} {1e3 * z:.2f} {rx:.4f} {ry:.4f} {rz:.4f}"
 
 
@@ -40,7 +40,7 @@ def talking(*lines: str, **options: object) -> tuple[ManualRobot, list[str], lis
     return ManualRobot(ask, told.append, arm=ARM, **options), asked, told  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("text", [pendant(), pose_text(POSE, Notation.UR)])
+@pytest.mark.parametrize("text", [pendant(), pose_text(POSE, NOTATIONS["ur"])])
 def test_millimetres_as_on_the_pendant_or_metres_as_in_the_program(text: str) -> None:
     robot, asked, _ = talking(text, DEGREES)
     reading = robot.read_pose()
@@ -51,7 +51,7 @@ def test_millimetres_as_on_the_pendant_or_metres_as_in_the_program(text: str) ->
 
 
 def test_other_units_are_asked_about_instead_of_believed() -> None:
-    x, y, z, rx, ry, rz = pose_numbers(POSE, Notation.UR)
+    x, y, z, rx, ry, rz = NOTATIONS["ur"].numbers(POSE)
     metres = f"{x} {y} {z} {rx} {ry} {rz}"
     in_program = f"p[{1e3 * x}, {1e3 * y}, {1e3 * z}, {rx}, {ry}, {rz}]"
     radians = " ".join(map(str, JOINTS))
@@ -109,7 +109,7 @@ def test_nobody_there() -> None:
 
 
 def test_goals_are_shown_with_their_units() -> None:
-    text = describe(GOAL, list(Notation), ARM.sliding)
+    text = describe(GOAL, SHOWN, ARM.sliding)
     for line in text.splitlines()[1:]:
         assert any(unit in line for unit in ("deg", "mm", "p[")), line
     assert joints_of_numbers(ARM, [90.0] * 6) == pytest.approx([np.pi / 2] * 6)

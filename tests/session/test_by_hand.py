@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from handeye.errors import InputError
+from handeye.notations import NOTATIONS, pose_text, read_pose_text
 from handeye.robots.manual import ManualRobot
-from handeye.robots.notations import Notation, pose_text, read_pose_text
 from handeye.robots.protocol import Goal
 from handeye.session.configuration import Prepared, begin, prepare
 from handeye.session.deciding import EndReason
@@ -31,7 +31,7 @@ class Typist:
         assert arm is not None
         if label is not None:
             line = next(line for line in text.splitlines() if line.strip().startswith("ur"))
-            arm.move_to(Goal(label[1], read_pose_text(line.split("ur", 1)[1], Notation.UR)))
+            arm.move_to(Goal(label[1], read_pose_text(line.split("ur", 1)[1], NOTATIONS["ur"])))
 
     def ask(self, question: str) -> str:
         arm = self._prepared.hidden_arm
@@ -40,7 +40,7 @@ class Typist:
         if "joint positions" in question:
             degrees = " ".join(f"{value:.6f}" for value in np.rad2deg(reading.joints_rad or ()))
             return degrees if self._joints else ""
-        return pose_text(reading.T_base_flange, Notation.UR)
+        return pose_text(reading.T_base_flange, NOTATIONS["ur"])
 
 
 @pytest.mark.parametrize("joints", [True, False])

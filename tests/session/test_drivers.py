@@ -13,9 +13,9 @@ from handeye.cameras.protocol import Frame
 from handeye.cameras.replay import ReplayCamera
 from handeye.datasets.images import read_image
 from handeye.errors import DeviceError, InputError
+from handeye.notations import MAKERS, Notation, pose_text
 from handeye.robots import open_arm
 from handeye.robots.manual import ManualRobot
-from handeye.robots.notations import Notation, pose_text
 from handeye.robots.protocol import Goal, Reading
 from handeye.robots.replay import ReplayRobot
 from handeye.robots.simulated import ArmErrors, SimulatedArm
@@ -50,7 +50,7 @@ def test_a_replay_keeps_the_contract() -> None:
         ReplayCamera(lambda: None).grab("x")
 
 
-@pytest.mark.parametrize("notation", list(Notation))
+@pytest.mark.parametrize("notation", MAKERS, ids=lambda notation: notation.name)
 def test_a_person_keeps_the_contract(notation: Notation, tmp_path: Path) -> None:
     texts = [pose_text(goal.T_base_flange, notation) for goal in goals()]
     (tmp_path / "pose.txt").write_text(texts[-1])

@@ -211,3 +211,26 @@ def test_derivatives_in_a_twist_are_those_of_the_moved_points() -> None:
     found = through_twist(points, weights)
     for i, step in enumerate(1e-6 * np.eye(6)):
         np.testing.assert_allclose(found[:, :, i], (values(step) - values(-step)) / 2e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("decimals", [3, 4, 5, 6])
+def test_few_written_decimals_are_made_rigid(decimals: int) -> None:
+    rng = np.random.default_rng(decimals)
+    for _ in range(200):
+        pose = Pose.exp([0.1, 0.2, 0.3, *rng.normal(0, 1.5, 3)])
+        written = pose.matrix.copy()
+        written[:3, :3] = written[:3, :3].round(decimals)
+        assert (Pose(written).inverse() @ pose).rotation_angle_rad < 10.0**-decimals
+
+
+@pytest.mark.parametrize("factor", [1.001, 0.998, 1.01])
+def test_what_rounding_does_not_explain_stays_refused(factor: float) -> None:
+    rng = np.random.default_rng(8)
+    for decimals in (3, 4, 6):
+        pose = Pose.exp([0.1, 0.2, 0.3, *rng.normal(0, 1.5, 3)])
+        written = pose.matrix.copy()
+        written[:3, :3] = (factor * written[:3, :3]).round(decimals)
+        if decimals == 3 and abs(factor - 1) < 2e-3:
+            continue  # as small as what three decimals leave
+        with pytest.raises(InputError, match=r"rigid|orthogonal|scale"):
+            Pose(written)

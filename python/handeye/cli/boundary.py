@@ -1,8 +1,10 @@
 """The one place where errors become words and exit codes, and answers become output."""
 
 import contextlib
+import difflib
 import io
 import os
+import shlex
 import sys
 import traceback
 from collections.abc import Sequence
@@ -13,7 +15,7 @@ from cyclopts import CycloptsError
 from handeye.cli.answer import Answer, json_text
 from handeye.cli.app import COMMANDS, make_app
 from handeye.cli.failures import UnexpectedError, UsageError, WarnedError
-from handeye.errors import ExitCode, HandeyeError, OutputError
+from handeye.errors import ExitCode, HandeyeError, InputError, OutputError, UnstatedError
 
 REPORT = (
     "This is a mistake in handeye. Please report it with the command, what --debug prints, and the version."
@@ -27,6 +29,7 @@ def run(arguments: Sequence[str]) -> int:
     as_json, debug = "--json" in options, "--debug" in options
     _show_what_can_be_shown()
     try:
+        arguments = _asked_for_help(arguments)
         if sys.stdout is None:  # pyright: ignore[reportUnnecessaryComparison] - closed by the caller
             raise OutputError("the standard output is closed", hint="give the command one")
         app = make_app(next(iter(arguments), ""))
@@ -37,6 +40,8 @@ def run(arguments: Sequence[str]) -> int:
         return ExitCode.SUCCESS
     except CycloptsError as error:
         return _fail(_usage(error, options), as_json=as_json, debug=debug)
+    except UnstatedError as error:
+        return _fail(_with_command(error, options), as_json=as_json, debug=debug)
     except HandeyeError as error:
         return _fail(error, as_json=as_json, debug=debug)
     except WarnedError as warned:
@@ -65,18 +70,41 @@ def _show_what_can_be_shown() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
+def _asked_for_help(arguments: Sequence[str]) -> Sequence[str]:
+    """Return what is meant by `help` and `help COMMAND`; other arguments as they are."""
+    asked = next(iter(arguments), "") == "help"
+    return [*arguments[1:2], "--help"] if asked else arguments
+
+
 def _usage(error: CycloptsError, arguments: Sequence[str]) -> HandeyeError:
     named = next((argument for argument in arguments if not argument.startswith("-")), None)
     names = [name for name, _, _ in COMMANDS]
     if named not in names:
         # Said here: the library would load every command to say it.
         message = "the command is missing" if named is None else f"no command {named!r}"
-        return UsageError(message, hint=f"there are {', '.join(names)}; handeye --help says more")
+        near = difflib.get_close_matches(named or "", names, 1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        return UsageError(message, hint=f"{meant}There are {', '.join(names)}; handeye --help says more")
     chain = " ".join(["handeye", *(error.command_chain or ())])
     message = " ".join(str(error).split())
     return UsageError(message, hint=f"{chain} --help says what can be asked").with_traceback(
         error.__traceback__
     )
+
+
+def _with_command(error: UnstatedError, arguments: Sequence[str]) -> HandeyeError:
+    """Return the error with the command line to run, where the pictures tell what to state."""
+    if not error.options:
+        return error
+    told = {option for option in error.options if option.startswith("--")}
+    kept, skip = list[str](), False
+    for argument in arguments:
+        if not skip and argument.partition("=")[0] not in told:
+            kept.append(argument)
+        skip = argument in told
+    command = shlex.join(["handeye", *kept, *error.options])
+    hint = f"run: {command}" + (f"\n      {error.hint}" if error.hint else "")
+    return InputError(error.message, code=error.code, hint=hint).with_traceback(error.__traceback__)
 
 
 def _unexpected(error: BaseException) -> HandeyeError:

@@ -37,6 +37,7 @@ def demo(
     *,
     picture: Path = Path("handeye-demo.png"),
     cell: Annotated[Path | None, Parameter(show_default=False)] = None,
+    folder: Annotated[Path | None, Parameter(show_default=False)] = None,
     starts: Annotated[int | None, Parameter(show_default=False)] = None,
     points_only: Annotated[float | None, Parameter(show_default=False)] = None,
     seed: Seed = 0,
@@ -52,12 +53,17 @@ def demo(
     is looked for in them. What was reached is compared with what was promised, and with the truth, which the
     loop does not see.
 
+    With --folder nothing is shown: a new folder with rendered pictures of a ChArUco board and the poses of a
+    simulated robot is written, to try the other commands on.
+
     Parameters
     ----------
     picture
         Where to write the picture (.png, .svg or .pdf).
     cell
         Drive simulated cells; a new folder for the session of the first one, with its report.
+    folder
+        Write a folder of pictures and poses.
     starts
         Number of random starts, the same for every policy (12); with --cell the number of cells (4).
     points_only
@@ -65,6 +71,8 @@ def demo(
     seed
         Seed of the starts, or of the cells.
     """
+    if folder is not None:
+        return _example(folder, seed)
     check_picture(picture)
     if cell is not None:
         return _closed_loop(picture, cell, CELLS if starts is None else starts, points_only, seed)
@@ -78,6 +86,29 @@ def demo(
     write_figure(picture, demonstration_figure(shown))
     data = shown.to_dict() | {"picture": str(picture)}
     return Answer(data, lambda console: _show(console, shown, picture))
+
+
+def _example(folder: Path, seed: int) -> Answer:
+    check_new_folder(folder)
+    from handeye.evaluation.example_folder import POSES_FILE, TARGET_FILE, write_example  # noqa: PLC0415
+
+    with progress("Rendering pictures") as advance:
+        example = write_example(folder, seed, progress=advance)
+    x, y, z = (1e3 * value for value in example.T_flange_camera.translation)
+    data = {
+        "folder": str(folder),
+        "pictures": list(example.pictures),
+        "poses": POSES_FILE,
+        "target": TARGET_FILE,
+        "T_flange_camera": example.T_flange_camera.to_list(),
+    }
+
+    def show(console: "Console") -> None:
+        count = len(example.pictures)
+        console.print(f"{folder}: {count} pictures, {POSES_FILE}, {TARGET_FILE}", soft_wrap=True)
+        console.print(f"the camera truly sits at {x:.3f} {y:.3f} {z:.3f} mm in the flange frame")
+
+    return Answer(data, show)
 
 
 def _closed_loop(picture: Path, folder: Path, cells: int, points_only: float | None, seed: int) -> Answer:

@@ -14,7 +14,7 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_output
 from handeye.cli.source import Source
 from handeye.datasets.writing import replace_file
-from handeye.export import EXPORTERS, Frames, Mount, Result, moveit_samples, read_result
+from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text, moveit_samples, read_result
 from handeye.solving import solve
 from handeye.types import Pose
 from handeye.types.calibration import ModelName
@@ -133,7 +133,7 @@ def export(
         "child_frame": mount.child,
         "T_parent_child": mount.T_parent_child.to_list(),
     }
-    return _answer(format, EXPORTERS[format].text(mount), output, mount.warnings, data)
+    return _answer(format, checked_text(EXPORTERS[format], mount), output, mount.warnings, data)
 
 
 def _solved(folder: Path, source: Source, model: ModelName, *, reduced: bool) -> Result:

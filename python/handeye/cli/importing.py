@@ -7,7 +7,7 @@ from handeye.cli.answer import Answer
 from handeye.cli.options import Common
 from handeye.cli.output import check_new_folder
 from handeye.cli.source import Source
-from handeye.datasets import write_recording
+from handeye.datasets import check_written, write_recording
 from handeye.importing import Opened
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def import_folder(
     check_new_folder(destination)
     opened = source.open(folder)
     write_recording(opened.recording, destination, images_from=opened.folder if images else None)
+    check_written(opened.recording, destination)
     data = _data(opened, destination)
     return Answer(data, lambda console: _show(console, opened, destination))
 

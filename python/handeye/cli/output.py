@@ -87,9 +87,12 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
     Raises
     ------
     OutputError
-        The system refuses to write; an older file is as it was.
+        The system refuses to write; an older file is as it was. Or what was written does not read back.
     """
-    replace_file(path, json_text(data).encode())
+    text = json_text(data)
+    replace_file(path, text.encode())
+    if path.is_file() and path.read_bytes() != text.encode():
+        raise OutputError(f"{path}: does not read back as it was written", hint="check the disk")
 
 
 def write_figure(path: Path, figure: "Figure") -> None:

@@ -16,7 +16,7 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.plan_together import Together, check_together, choose_together, show_together, together_data
 from handeye.cli.source import Source, mindful_of
-from handeye.datasets import read_poses_csv
+from handeye.datasets import read_poses
 from handeye.errors import InputError
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
 from handeye.planning.prediction import Sight
@@ -121,8 +121,8 @@ def plan(
     if not 0 < speed_deg_s < float("inf"):
         raise UsageError(f"--speed-deg-s {speed_deg_s}, expected above zero")
     worth = _criterion(criterion, tool_point_mm)
-    table = None if candidates is None else read_poses_csv(candidates)
-    opened = source.open(folder)
+    table = None if candidates is None else read_poses(candidates, source.stated())
+    opened = (source if table is None else source.of_a_recording(folder)).open(folder)
     measurements = Measurements.of_recording(opened.recording)
     check_views(measurements)
     taken = _taken(measurements, used, first, with_file=table is not None)

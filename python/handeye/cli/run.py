@@ -17,11 +17,11 @@ from handeye.cli.run_options import Limits, Simulated, Timeouts
 from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.notations import SHOWN
 from handeye.planning.collisions import Body
 from handeye.planning.constraints import ViewLimits
 from handeye.robots import open_arm
 from handeye.robots.manual import describe
-from handeye.robots.notations import Notation
 from handeye.robots.protocol import Goal
 from handeye.session.configuration import Prepared, begin, go_on, prepare
 from handeye.session.deciding import START_VIEWS, EndReason
@@ -234,7 +234,7 @@ def _confirm(wanted: bool | None, configuration: Configuration, person: Person) 
     sliding = () if configuration.robot is None else open_arm(configuration.robot).sliding
 
     def confirm(goal: Goal) -> bool:
-        person.tell(describe(goal, [Notation.UR], sliding))
+        person.tell(describe(goal, SHOWN[:1], sliding))
         try:
             return person.ask("move there? [y/N] ").strip().lower() in {"y", "yes"}
         except EOFError:
@@ -299,7 +299,7 @@ def _plan(prepared: Prepared) -> Answer:
         for goal in goals:
             # Nobody has told which posture it is: joints of another one would be a trap.
             known = goal if start.posture_known else replace(goal, joints_rad=None)
-            console.print(describe(known, list(Notation), prepared.arm.sliding), soft_wrap=True)
+            console.print(describe(known, SHOWN, prepared.arm.sliding), soft_wrap=True)
 
     return Answer(data, show)
 

@@ -9,7 +9,9 @@ from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
+from handeye.cli.solve_poses import answer_for_poses
 from handeye.cli.source import Source, mindful_of
+from handeye.datasets import PosePairs
 from handeye.importing import Opened
 from handeye.solving import solve as solve_recording
 from handeye.solving.confidence import Ellipsoid, position_region, within
@@ -33,14 +35,15 @@ def solve(
 ) -> Answer:
     """Calibrate from a folder of views.
 
-    The folder is a recording (docs: conventions), or images and poses in the layout of rwhe-calib or
-    robot_cal_tools; then the target is found in the images first and, if the files hold no camera, the camera
-    is calibrated from the same images. Nothing in the folder is changed.
+    The folder is a recording (docs: conventions), or images and the robot's poses in a file of any kind or in
+    a layout that is known (docs: import); then the target is found in the images first and, if the files hold
+    no camera, the camera is calibrated from the same images. Where nothing says how the poses are written,
+    the images tell. Nothing in the folder is changed.
 
     Parameters
     ----------
     folder
-        Folder with the views.
+        Folder with the views, or a file of samples of easy_handeye2 or MoveIt.
     model
         auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
     reduced
@@ -51,7 +54,9 @@ def solve(
         Also write the JSON object to this file.
     """
     check_output(output)
-    opened = source.open(folder)
+    opened = source.open_any(folder)
+    if isinstance(opened, PosePairs):
+        return answer_for_poses(opened, output)
     with mindful_of(opened.warnings):
         kinematics = arm.kinematics(opened.recording, model)
         calibration = solve_recording(

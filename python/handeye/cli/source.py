@@ -2,7 +2,7 @@
 
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -10,9 +10,11 @@ from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
-from handeye.datasets import DataWarning, read_camera, read_target
+from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, read_target
+from handeye.datasets.recording_format import FILE_NAME
 from handeye.errors import HandeyeError
-from handeye.importing import Opened, SourceOptions, open_folder
+from handeye.importing import Opened, SourceOptions, open_any, open_folder
+from handeye.notations import Direction, Unit, notation_of
 from handeye.types import Chessboard, Mounting, Target
 
 
@@ -64,9 +66,17 @@ class Source(Board):
     """What the files of a folder may leave open; a recording of ours leaves nothing open but the camera."""
 
     camera: Path | None = None
-    """Camera, in TOML or JSON with the fields of [camera] in a recording, or ROS's camera_info .yaml."""
+    """Camera: TOML or JSON of ours, ROS's camera_info, OpenCV's FileStorage, Kalibr, RealSense, Open3D."""
     mounting: Mounting | None = None
     """Where the camera sits."""
+    poses: str | None = None
+    """File or folder with the robot's poses: CSV, text, JSON or YAML."""
+    notation: str | None = None
+    """How they are written: ur, kuka, fanuc, abb, ..., or euler_zyx_moving_deg and its like."""
+    unit: Unit | None = None
+    """Unit of their lengths."""
+    poses_are: Direction | None = None
+    """Whose pose in which frame they are; the flange in the base if not given."""
     layout: Annotated[str | None, Parameter(help="Layout of the files, where several fit.")] = None
 
     def options(self) -> SourceOptions:
@@ -86,7 +96,42 @@ class Source(Board):
             pattern=pattern,
             mounting=self.mounting,
             camera=None if self.camera is None else read_camera(self.camera),
+            poses=self.poses,
+            stated=self.stated(),
         )
+
+    def stated(self) -> Statement:
+        """Return what is said about the robot's poses.
+
+        Raises
+        ------
+        InputError
+            A notation that is not known.
+        """
+        notation = None if self.notation is None else notation_of(self.notation)
+        return Statement(notation, self.unit, self.poses_are)
+
+    def of_a_recording(self, folder: Path) -> "Source":
+        """Return the options for a folder where what is said about poses means those of another file.
+
+        A recording says itself how its poses are written; pictures beside the other file are taken to be
+        written the same way.
+        """
+        if self.poses is not None or not (folder / FILE_NAME).is_file():
+            return self
+        return replace(self, notation=None, unit=None, poses_are=None)
+
+    def open_any(self, folder: Path) -> Opened | PosePairs:
+        """Read a folder or a file, also one that holds poses of the target instead of pictures.
+
+        Raises
+        ------
+        UsageError, InputError, DetectionError
+            As `options` and `handeye.importing.open_any`.
+        """
+        options = self.options()
+        with progress("Looking for the target in the images") as advance:
+            return open_any(folder, options, progress=advance)
 
     def open(self, folder: Path) -> Opened:
         """Read a folder, with progress where the target has to be found in images first.

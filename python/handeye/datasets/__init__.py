@@ -4,12 +4,16 @@ An importer gives an `ImageSet`, images and poses in which the points are still 
 a `Recording`, ready to be solved.
 """
 
-from handeye.datasets.image_set import ImageSet, ImportOptions, Shot
+from handeye.datasets.camera_files import read_camera
+from handeye.datasets.image_set import ImageSet, ImportOptions, Shot, UnreadPoses
 from handeye.datasets.importer import Importer
 from handeye.datasets.loading import IMPORTERS, load
-from handeye.datasets.parameter_files import read_camera, read_target
+from handeye.datasets.parameter_files import read_target
 from handeye.datasets.plausibility import DataWarning, recording_warnings
-from handeye.datasets.poses_csv import PoseTable, read_poses_csv
+from handeye.datasets.pose_files import PoseTable, read_pose_rows, read_poses
+from handeye.datasets.pose_pairs import PosePair, PosePairs
+from handeye.datasets.pose_rows import PoseRows, Reading, Statement
+from handeye.datasets.read_back import check_written
 from handeye.datasets.recording_format import LoadedRecording, read_recording, write_recording
 
 __all__ = [
@@ -19,11 +23,19 @@ __all__ = [
     "ImportOptions",
     "Importer",
     "LoadedRecording",
+    "PosePair",
+    "PosePairs",
+    "PoseRows",
     "PoseTable",
+    "Reading",
     "Shot",
+    "Statement",
+    "UnreadPoses",
+    "check_written",
     "load",
     "read_camera",
-    "read_poses_csv",
+    "read_pose_rows",
+    "read_poses",
     "read_recording",
     "read_target",
     "recording_warnings",

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning
+from handeye.datasets.pose_rows import NOTHING_STATED, PoseRows, Reading, Statement
 from handeye.datasets.reading import inside
 from handeye.errors import InputError
 from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth, View
@@ -111,6 +112,28 @@ class ImageSet:
         return Recording(self.name, self.mounting, camera, self.target, tuple(views), self.truth, self.source)
 
 
+@dataclass(frozen=True, eq=False)
+class UnreadPoses:
+    """Pictures and rows that belong to them, where it is not said what the rows mean.
+
+    Attributes
+    ----------
+    images
+        The pictures, in the order of the rows; their poses mean nothing yet.
+    rows
+        One for each picture.
+    readings
+        What the rows may mean.
+    file
+        The file, as the caller would name it.
+    """
+
+    images: ImageSet
+    rows: PoseRows
+    readings: tuple[Reading, ...]
+    file: str
+
+
 @dataclass(frozen=True)
 class ImportOptions:
     """What the files of a layout may leave open.
@@ -123,11 +146,17 @@ class ImportOptions:
         Rows and columns of inner corners of a chessboard, where the files have only the size of its squares.
     mounting
         Where the camera sits; None for what the files say, or else in the hand.
+    poses
+        File or folder with the robot's poses, where several fit or none is found.
+    stated
+        How these poses are written, as far as it is said.
     """
 
     target: Target | None = None
     pattern: tuple[int, int] | None = None
     mounting: Mounting | None = None
+    poses: str | None = None
+    stated: Statement = NOTHING_STATED
 
 
 def common_image_size(folder: Path, shots: Iterable[Shot]) -> tuple[int, int] | None:

@@ -4,7 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from handeye.datasets.image_set import ImageSet, ImportOptions
+from handeye.datasets.image_set import ImageSet, ImportOptions, UnreadPoses
+from handeye.datasets.pose_pairs import PosePairs
+
+Imported = ImageSet | UnreadPoses | PosePairs
 
 
 @dataclass(frozen=True)
@@ -18,12 +21,15 @@ class Importer:
     looks_like
         What tells it, for a person.
     recognises
-        Tells whether a folder has this layout, by the names of its files; raises nothing.
+        Tells whether a folder or a file has this layout; raises nothing.
     read
-        Reads a folder; raises `InputError`.
+        Reads it; raises `InputError`.
+    is_general
+        Whether it reads whatever looks like pictures and poses; asked only where no other knows the folder.
     """
 
     name: str
     looks_like: str
     recognises: Callable[[Path], bool]
-    read: Callable[[Path, ImportOptions], ImageSet]
+    read: Callable[[Path, ImportOptions], Imported]
+    is_general: bool = False

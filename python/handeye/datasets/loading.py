@@ -3,16 +3,35 @@
 import os
 from pathlib import Path
 
-from handeye.datasets import recording_format, robot_cal_tools, rwhe_calib
-from handeye.datasets.image_set import ImageSet, ImportOptions
-from handeye.datasets.importer import Importer
+from handeye.datasets import (
+    easy_handeye2,
+    industrial_calibration,
+    moveit_samples,
+    pose_list,
+    recording_format,
+    robot_cal_tools,
+    rwhe_calib,
+    visp,
+)
+from handeye.datasets.image_set import ImportOptions
+from handeye.datasets.importer import Imported, Importer
+from handeye.datasets.pose_rows import NOTHING_STATED, Statement
 from handeye.datasets.reading import existing_folder, is_file
 from handeye.datasets.recording_format import LoadedRecording
 from handeye.errors import InputError
 from handeye.types import Mounting, Target
 
 IMPORTERS: dict[str, Importer] = {
-    importer.name: importer for importer in (rwhe_calib.IMPORTER, robot_cal_tools.IMPORTER)
+    importer.name: importer
+    for importer in (
+        rwhe_calib.IMPORTER,
+        robot_cal_tools.IMPORTER,
+        industrial_calibration.IMPORTER,
+        easy_handeye2.IMPORTER,
+        moveit_samples.IMPORTER,
+        visp.IMPORTER,
+        pose_list.IMPORTER,
+    )
 }
 # Loading these runs or rebuilds whatever their author put in.
 _NEVER_LOADED = frozenset({".mat", ".pkl", ".pickle", ".npy", ".npz"})
@@ -26,7 +45,9 @@ def load(
     target: Target | None = None,
     pattern: tuple[int, int] | None = None,
     mounting: Mounting | None = None,
-) -> LoadedRecording | ImageSet:
+    poses: str | None = None,
+    stated: Statement | None = None,
+) -> LoadedRecording | Imported:
     """Read a folder: a recording of ours, or images and poses in a layout of others.
 
     Parameters
@@ -35,21 +56,22 @@ def load(
         The folder, or the file in it that tells the layout (such as `recording.toml`).
     layout
         Name of one of `IMPORTERS`; None to recognise it.
-    target, pattern, mounting
+    target, pattern, mounting, poses, stated
         What the files of others leave open, see `ImportOptions`; a recording leaves nothing open.
 
     Returns
     -------
-    LoadedRecording or ImageSet
-        An `ImageSet` has no points yet: they are still to be detected.
+    LoadedRecording, ImageSet, UnreadPoses or PosePairs
+        An `ImageSet` has no points yet: they are still to be detected; of `UnreadPoses` not even the robot's
+        poses are known; `PosePairs` never had pictures.
 
     Raises
     ------
     InputError
         Nothing that can be read, or not what it claims to be.
     """
-    options = ImportOptions(target, pattern, mounting)
-    folder = _folder(path)
+    options = ImportOptions(target, pattern, mounting, poses, stated or NOTHING_STATED)
+    folder = _place(path)
     if layout is not None:
         importer = IMPORTERS.get(layout)
         if importer is None:
@@ -60,11 +82,13 @@ def load(
     if is_file(folder / recording_format.FILE_NAME):
         if options != ImportOptions():
             raise InputError(
-                f"{folder}: a recording says its target and mounting itself",
+                f"{folder}: a recording says its target, mounting and poses itself",
                 code="options_unused",
-                hint=f"leave the options away, or change {recording_format.FILE_NAME}",
+                hint=f"leave the options out, or change {recording_format.FILE_NAME}",
             )
         return recording_format.read_recording(folder)
+    if poses is not None or options.stated != NOTHING_STATED:
+        return pose_list.IMPORTER.read(folder, options)
     fitting = recognise(folder)
     if not fitting:
         raise _not_recognised(folder)
@@ -75,12 +99,13 @@ def load(
 
 
 def recognise(folder: Path) -> list[Importer]:
-    """Return the importers that recognise a folder."""
-    return [importer for importer in IMPORTERS.values() if importer.recognises(folder)]
+    """Return the importers that recognise a folder or a file; a general one only where no other does."""
+    fitting = [importer for importer in IMPORTERS.values() if importer.recognises(folder)]
+    return [importer for importer in fitting if not importer.is_general] or fitting
 
 
-def _folder(path: str | os.PathLike[str]) -> Path:
-    """Return the folder that is meant by a path."""
+def _place(path: str | os.PathLike[str]) -> Path:
+    """Return the folder, or the file that is read alone, that is meant by a path."""
     try:
         given = Path(path)
         if given.suffix.lower() in _NEVER_LOADED:
@@ -90,7 +115,9 @@ def _folder(path: str | os.PathLike[str]) -> Path:
                 hint="give the folder with the text files",
             )
         known = {recording_format.FILE_NAME, rwhe_calib.POSES_FILE, *robot_cal_tools.LIST_FILES}
-        return existing_folder(given.parent if given.name in known and is_file(given) else given)
+        if is_file(given):
+            return given.parent if given.name in known else given
+        return existing_folder(given)
     except (TypeError, ValueError) as error:
         raise InputError(f"{path!r}: not a path ({error})", code="unreadable") from error
 

@@ -4,6 +4,7 @@ Whatever is wrong becomes an `InputError` that names the file.
 """
 
 import errno
+import itertools
 import os
 import re
 import stat
@@ -76,6 +77,23 @@ def file_names(folder: Path) -> list[str]:
                     raise InputError(f"{folder}: more than {MAX_FOLDER_ENTRIES} entries", code="too_large")
                 if not entry.name.startswith(".") and entry.is_file():
                     names.append(entry.name)
+    except OSError as error:
+        raise InputError(f"{folder}: {reason(error)}", code="unreadable") from error
+    return sorted(names, key=_counting_order)
+
+
+def folder_names(folder: Path) -> list[str]:
+    """Return the names of the folders in a folder, without hidden ones, in the order people count.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be read.
+    """
+    try:
+        with os.scandir(folder) as entries:
+            listed = itertools.islice(entries, MAX_FOLDER_ENTRIES)
+            names = [entry.name for entry in listed if not entry.name.startswith(".") and entry.is_dir()]
     except OSError as error:
         raise InputError(f"{folder}: {reason(error)}", code="unreadable") from error
     return sorted(names, key=_counting_order)

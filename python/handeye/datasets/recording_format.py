@@ -20,7 +20,8 @@ from handeye.datasets.corners import corners_text, read_corners
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning, recording_warnings
 from handeye.datasets.reading import MIB, existing_folder, inside, is_file, located, read_text
-from handeye.datasets.toml_text import toml_text, toml_values
+from handeye.datasets.toml_reading import parse_toml
+from handeye.datasets.toml_text import toml_text
 from handeye.datasets.writing import copy_file, is_occupied, new_folder, replace_file, write_file
 from handeye.errors import HandeyeError, InputError, OutputError
 from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth, View
@@ -196,14 +197,7 @@ def write_recording(
 
 def _read_document(file: Path) -> _RecordingDocument:
     text = read_text(file, MAX_BYTES)
-    try:
-        data = toml_values(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"{file}: not TOML: {str(error)[:200]}",
-            code="not_toml",
-            hint="repair the line, or write the recording again",
-        ) from error
+    data = parse_toml(text, file)
     if data.get("format") != FORMAT:
         raise InputError(
             f"{file}: format {str(data.get('format'))[:60]!r}, expected {FORMAT!r}", code="unknown_format"

@@ -1,4 +1,4 @@
-"""The layout of robot_cal_tools (and of the older industrial_calibration examples).
+"""The layout of robot_cal_tools (and of older examples of industrial_calibration).
 
 ::
 
@@ -38,7 +38,9 @@ MAX_SHOTS = 100_000
 ASSUMED_DIAMETER_SHARE = 0.5
 
 
-class _Entry(msgspec.Struct):
+class Entry(msgspec.Struct):
+    """One station: files of pose and image, relative to the list."""
+
     pose: str
     image: str
 
@@ -53,7 +55,9 @@ class _PoseDocument(msgspec.Struct):
     qw: float
 
 
-class _Intrinsics(msgspec.Struct):
+class Intrinsics(msgspec.Struct):
+    """A pinhole camera, in pixels."""
+
     fx: float
     fy: float
     cx: float
@@ -61,10 +65,12 @@ class _Intrinsics(msgspec.Struct):
 
 
 class _CameraDocument(msgspec.Struct):
-    intrinsics: _Intrinsics
+    intrinsics: Intrinsics
 
 
-class _Finder(msgspec.Struct):
+class Finder(msgspec.Struct):
+    """The target, lengths in metres."""
+
     type: str
     rows: int
     cols: int
@@ -75,12 +81,18 @@ class _Finder(msgspec.Struct):
 
 
 class _TargetDocument(msgspec.Struct):
-    target_finder: _Finder
+    target_finder: Finder
 
 
 def recognises(folder: Path) -> bool:
-    """Tell whether a folder has this layout."""
-    return _list_file(folder) is not None
+    """Tell whether a folder has this layout: the file holds a list, or cannot be read at all."""
+    listed = _list_file(folder)
+    if listed is None:
+        return False
+    try:
+        return not isinstance(read_yaml(folder / listed), dict)
+    except InputError:
+        return True
 
 
 def read(folder: Path, options: ImportOptions) -> ImageSet:
@@ -96,10 +108,8 @@ def read(folder: Path, options: ImportOptions) -> ImageSet:
     if listed is None:
         raise InputError(f"{folder}: {LIST_FILES[0]} is missing", code="missing_file")
     file = folder / listed
-    entries = read_document(read_yaml(file), list[_Entry], str(file), lax=True)
-    if len(entries) > MAX_SHOTS:
-        raise InputError(f"{file}: {len(entries)} entries, expected at most {MAX_SHOTS}", code="too_large")
-    shots = tuple(_shot(entry, name, file) for entry, name in zip(entries, _names(entries), strict=True))
+    entries = read_document(read_yaml(file), list[Entry], str(file), lax=True)
+    shots = shots_of(entries, file)
     size = common_image_size(folder, shots)
     target, warnings = _target(folder, options)
     camera, camera_notes = _camera(folder, size)
@@ -118,6 +128,19 @@ def read(folder: Path, options: ImportOptions) -> ImageSet:
     )
 
 
+def shots_of(entries: list[Entry], file: Path) -> tuple[Shot, ...]:
+    """Return the stations of a list in a file.
+
+    Raises
+    ------
+    InputError
+        Too many, or a file of a pose that is missing, leaves the folder, or is no pose.
+    """
+    if len(entries) > MAX_SHOTS:
+        raise InputError(f"{file}: {len(entries)} entries, expected at most {MAX_SHOTS}", code="too_large")
+    return tuple(_shot(entry, name, file) for entry, name in zip(entries, _names(entries), strict=True))
+
+
 def _list_file(folder: Path) -> str | None:
     """Return the name of the list of poses and images."""
     if is_file(folder / LIST_FILES[0]):
@@ -126,7 +149,7 @@ def _list_file(folder: Path) -> str | None:
     return LIST_FILES[1] if is_file(folder / LIST_FILES[1]) and is_file(folder / TARGET_FILE) else None
 
 
-def _shot(entry: _Entry, name: str, file: Path) -> Shot:
+def _shot(entry: Entry, name: str, file: Path) -> Shot:
     where = f"{file}: image {entry.image[:120]!r}"
     path = inside(file.parent, entry.pose, f"{where}: pose")
     document = read_document(read_yaml(path), _PoseDocument, str(path), lax=True)
@@ -137,7 +160,7 @@ def _shot(entry: _Entry, name: str, file: Path) -> Shot:
         return Shot(name, entry.image, pose)
 
 
-def _names(entries: list[_Entry]) -> list[str]:
+def _names(entries: list[Entry]) -> list[str]:
     """Return the names of the views: those of the images, numbered where two images have one name."""
     stems = [re.sub(r"[^A-Za-z0-9_.-]", "_", Path(entry.image).stem)[:80] for entry in entries]
     if len({stem.lower() for stem in stems}) == len(stems):
@@ -151,36 +174,47 @@ def _target(folder: Path, options: ImportOptions) -> tuple[Target, tuple[DataWar
     file = folder / TARGET_FILE
     finder = read_document(read_yaml(file), _TargetDocument, str(file), lax=True).target_finder
     with located(str(file)):
-        if "ModifiedCircleGrid" in finder.type:
-            spacing = _needed(finder.spacing, "spacing")
-            # Their rows are counted from the top with the origin, the large dot, at the bottom.
-            grid = CircleGrid(
-                finder.rows,
-                finder.cols,
-                spacing,
-                ASSUMED_DIAMETER_SHARE * spacing,
-                marked=(finder.rows - 1) * finder.cols,
-            )
-            message = (
-                f"{TARGET_FILE} does not say how large the dots are: {grid.diameter_m * 1e3:g} mm assumed, "
-                "which matters only for the small shift of a circle's centre by perspective"
-            )
-            return grid, (DataWarning("diameter_assumed", message),)
-        if "Charuco" in finder.type:
-            number = _needed(finder.dictionary, "dictionary")
-            board = Charuco(
-                finder.rows,
-                finder.cols,
-                _needed(finder.chessboard_dim, "chessboard_dim"),
-                _needed(finder.aruco_marker_dim, "aruco_marker_dim"),
-                dictionary_of_number(number, "target_finder"),
-            )
-            return board, ()
-        raise InputError(
-            f"target_finder: type {finder.type[:80]!r}, expected a modified circle grid or a ChArUco board",
-            code="unknown_target",
-            hint="give the target yourself",
+        return target_of(finder)
+
+
+def target_of(finder: Finder) -> tuple[Target, tuple[DataWarning, ...]]:
+    """Return the target of a finder, and what was assumed.
+
+    Raises
+    ------
+    InputError
+        A kind of target that is not known here, or a measure that is missing.
+    """
+    if "ModifiedCircleGrid" in finder.type:
+        spacing = _needed(finder.spacing, "spacing")
+        # Their rows are counted from the top with the origin, the large dot, at the bottom.
+        grid = CircleGrid(
+            finder.rows,
+            finder.cols,
+            spacing,
+            ASSUMED_DIAMETER_SHARE * spacing,
+            marked=(finder.rows - 1) * finder.cols,
         )
+        message = (
+            f"{TARGET_FILE} does not say how large the dots are: {grid.diameter_m * 1e3:g} mm assumed, "
+            "which matters only for the small shift of a circle's centre by perspective"
+        )
+        return grid, (DataWarning("diameter_assumed", message),)
+    if "Charuco" in finder.type:
+        number = _needed(finder.dictionary, "dictionary")
+        board = Charuco(
+            finder.rows,
+            finder.cols,
+            _needed(finder.chessboard_dim, "chessboard_dim"),
+            _needed(finder.aruco_marker_dim, "aruco_marker_dim"),
+            dictionary_of_number(number, "target_finder"),
+        )
+        return board, ()
+    raise InputError(
+        f"target_finder: type {finder.type[:80]!r}, expected a modified circle grid or a ChArUco board",
+        code="unknown_target",
+        hint="give the target yourself",
+    )
 
 
 def _needed(value: Any, field: str) -> Any:  # noqa: ANN401 - what is there is returned as it is

@@ -5,6 +5,9 @@ is text to it, ``1:30`` a number in base 60). Aliases are refused: a few lines o
 key that is there twice is refused: the reader could not know which of the two was meant.
 """
 
+import itertools
+import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import cast
 
@@ -15,6 +18,9 @@ from handeye.errors import InputError
 
 # The parser reads some 100 kB a second; a list of 10 000 images has 450 kB.
 MAX_BYTES = MIB // 2
+MAX_DOCUMENTS = 1000
+# Numbers as NumPy and C++ print them, 1200. and 3.e-05, get their zero: not everybody reads them without.
+_SHORT_NUMBER = re.compile(r"[+-]?\d{1,300}\.([eE][+-]?\d{1,5})?\Z", re.ASCII)
 
 
 def read_yaml(path: Path) -> object:
@@ -25,12 +31,27 @@ def read_yaml(path: Path) -> object:
     InputError
         The file cannot be read, is too large, or is not such YAML.
     """
-    text = read_text(path, MAX_BYTES)
+    documents = yaml_documents(read_text(path, MAX_BYTES), str(path))
+    if len(documents) > 1:
+        raise InputError(f"{path}: {len(documents)} documents, expected one", code="not_yaml")
+    return documents[0] if documents else None
+
+
+def yaml_documents(text: str, where: str) -> list[object]:
+    """Return the documents of a text in YAML.
+
+    Raises
+    ------
+    InputError
+        Not such YAML, or too long.
+    """
+    if len(text) > MAX_BYTES:
+        raise InputError(f"{where}: {len(text)} characters, expected at most {MAX_BYTES}", code="too_large")
     try:
-        root = cast("yaml.Node | None", yaml.compose(text, Loader=yaml.BaseLoader))  # pyright: ignore[reportUnknownMemberType]
-        return _plain(root, set())
+        roots = cast("Iterable[yaml.Node | None]", yaml.compose_all(text, Loader=yaml.BaseLoader))  # pyright: ignore[reportUnknownMemberType]
+        return [_plain(root, set()) for root in itertools.islice(roots, MAX_DOCUMENTS)]
     except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise InputError(f"{path}: not YAML as expected: {error}", code="not_yaml") from error
+        raise InputError(f"{where}: not YAML as expected: {error}", code="not_yaml") from error
 
 
 def _plain(node: yaml.Node | None, seen: set[int]) -> object:
@@ -41,7 +62,7 @@ def _plain(node: yaml.Node | None, seen: set[int]) -> object:
         raise ValueError("aliases (*name) are not accepted")
     seen.add(id(node))
     if isinstance(node, yaml.ScalarNode):
-        return str(node.value)
+        return str(node.value).replace(".", ".0") if _SHORT_NUMBER.match(node.value) else str(node.value)
     if isinstance(node, yaml.SequenceNode):
         return [_plain(item, seen) for item in node.value]
     table: dict[str, object] = {}

@@ -6,6 +6,7 @@ from handeye.export.frames import REP_103_OPTICAL, Frames
 from handeye.export.mount import Mount
 from handeye.export.moveit_samples import moveit_samples
 from handeye.export.result import Result, read_result
+from handeye.export.transforms import Transform, checked_text, read_transform
 
 EXPORTERS: dict[str, Exporter] = {
     exporter.name: exporter
@@ -28,6 +29,9 @@ __all__ = [
     "Frames",
     "Mount",
     "Result",
+    "Transform",
+    "checked_text",
     "moveit_samples",
     "read_result",
+    "read_transform",
 ]

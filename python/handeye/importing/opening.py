@@ -7,10 +7,24 @@ from enum import StrEnum
 from functools import partial
 from pathlib import Path
 
-from handeye.datasets import DataWarning, ImageSet, LoadedRecording, Shot, load, recording_warnings
+from handeye.datasets import (
+    DataWarning,
+    ImageSet,
+    LoadedRecording,
+    PosePairs,
+    Shot,
+    Statement,
+    UnreadPoses,
+    load,
+    recording_warnings,
+)
 from handeye.datasets.images import read_image
+from handeye.datasets.pose_rows import NOTHING_STATED
 from handeye.detection import Detection, Image, Reason, calibrate_camera, detect_all
 from handeye.errors import DetectionError, HandeyeError, InputError
+from handeye.importing.readings import compare
+from handeye.importing.unstated import unstated
+from handeye.solving import Measurements
 from handeye.types import Camera, Mounting, Recording, Target
 
 # So many images from the first on, all with a board of another size: the size was given wrongly, and looking
@@ -45,6 +59,10 @@ class SourceOptions:
         Where the camera sits; None for what the files say, or else in the hand.
     camera
         The camera; None for what the files say, or else calibrated from the images.
+    poses
+        File or folder with the robot's poses, where several fit.
+    stated
+        How these poses are written, as far as it is said.
     """
 
     layout: str | None = None
@@ -52,6 +70,8 @@ class SourceOptions:
     pattern: tuple[int, int] | None = None
     mounting: Mounting | None = None
     camera: Camera | None = None
+    poses: str | None = None
+    stated: Statement = NOTHING_STATED
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +122,36 @@ def open_folder(
     Raises
     ------
     InputError
-        Nothing that can be read, an image missing or damaged, or too few views to calibrate the camera from.
+        Nothing that can be read, an image missing or damaged, too few views to calibrate the camera from, a
+        camera of another size than the images, or nothing that says how the robot's poses are written: then
+        the message names the way that agrees with the images.
     DegenerateError
         The views do not determine the camera.
     DetectionError
         The target is in none of the images.
+    """
+    opened = open_any(path, options, progress=progress)
+    if isinstance(opened, PosePairs):
+        raise InputError(
+            f"{opened.name}: poses of the target without pictures, expected pictures or corners",
+            code="no_pictures",
+            hint="handeye solve takes it; other commands need what the camera saw",
+        )
+    return opened
+
+
+def open_any(
+    path: str | os.PathLike[str],
+    options: SourceOptions | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> Opened | PosePairs:
+    """Read what `open_folder` reads, and sets that hold poses of the target instead of pictures.
+
+    Raises
+    ------
+    InputError, DegenerateError, DetectionError
+        As `open_folder`.
     """
     options = options or SourceOptions()
     loaded = load(
@@ -115,9 +160,16 @@ def open_folder(
         target=options.target,
         pattern=options.pattern,
         mounting=options.mounting,
+        poses=options.poses,
+        stated=options.stated,
     )
     if isinstance(loaded, LoadedRecording):
         return _of_recording(loaded, options.camera)
+    if isinstance(loaded, PosePairs):
+        return loaded
+    if isinstance(loaded, UnreadPoses):
+        opened = _of_images(loaded.images, options.camera, progress or _nothing)
+        raise _told_by_pictures(loaded, opened.recording, options.mounting)
     return _of_images(loaded, options.camera, progress or _nothing)
 
 
@@ -130,6 +182,7 @@ def _of_recording(loaded: LoadedRecording, camera: Camera | None) -> Opened:
         return Opened(
             loaded.recording, loaded.folder, "handeye", CameraOrigin.FILES, warnings=loaded.warnings
         )
+    _check_size(camera, loaded.recording.camera.size_px, f"the pictures of {loaded.recording.name}")
     recording = replace(loaded.recording, camera=camera)
     return Opened(
         recording, loaded.folder, "handeye", CameraOrigin.GIVEN, warnings=recording_warnings(recording)
@@ -201,10 +254,32 @@ def _detect(
 def _camera(
     images: ImageSet, given: Camera | None, found: Mapping[str, Detection], size: tuple[int, int]
 ) -> tuple[Camera, CameraOrigin]:
-    if given is not None:
-        return given, CameraOrigin.GIVEN
-    if images.camera is not None:
-        return images.camera, CameraOrigin.FILES
+    for camera, origin in ((given, CameraOrigin.GIVEN), (images.camera, CameraOrigin.FILES)):
+        if camera is not None:
+            _check_size(camera, size, f"the pictures in {images.folder}")
+            return camera, origin
     camera = calibrate_camera(images.target, found, size).camera
     of_views = Camera(camera.lens, camera.parameters, *camera.size_px, camera.covariance, from_views=True)
     return of_views, CameraOrigin.CALIBRATED
+
+
+def _check_size(camera: Camera, size: tuple[int, int], what: str) -> None:
+    if camera.size_px != size:
+        raise InputError(
+            f"the camera is calibrated for {camera.width_px} x {camera.height_px} pixels, {what} have "
+            f"{size[0]} x {size[1]}",
+            code="image_size",
+            hint="give the calibration at the size of the pictures, or leave the camera out: it is then "
+            "calibrated from the pictures",
+        )
+
+
+def _told_by_pictures(unread: UnreadPoses, recording: Recording, mounting: Mounting | None) -> InputError:
+    """Return the error that says which way to read the robot's poses agrees with the pictures."""
+    measurements = Measurements.of_recording(recording)
+    places = {shot.name: row for row, shot in enumerate(unread.images.shots)}
+    kept = [places[view.name] for view in measurements.views]
+    mountings = tuple(Mounting) if mounting is None else (mounting,)
+    rows = unread.rows.select(kept)
+    agreements = compare(rows, unread.readings, measurements.camera_poses, mountings)
+    return unstated(unread, agreements, mounting_stated=mounting is not None, views=len(kept))

@@ -1,6 +1,7 @@
 """Which view to take next, and when to stop; the robot and the camera stay outside."""
 
 from handeye.planning.candidates import Candidate, Pool
+from handeye.planning.next_views import plan
 from handeye.planning.planner import Planner, PlannerOptions, Proposal, Verdict, replay
 from handeye.planning.policies import POLICIES, Policy, make_policy
 from handeye.planning.prediction import Prediction, Sight
@@ -36,6 +37,7 @@ __all__ = [
     "ToolAccuracy",
     "Verdict",
     "make_policy",
+    "plan",
     "rank",
     "replay",
 ]

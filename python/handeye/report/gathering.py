@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from handeye.export import EXPORTERS, Frames, Mount, Result
+from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text
 from handeye.export.result import read_result, read_result_json
 from handeye.importing import Opened
 from handeye.report import document
@@ -203,7 +203,7 @@ def _report(
             Open(sentence=sentence, cure=cure)
             for sentence, cure in dict.fromkeys((d.sentence, d.cure) for d in solved.unobservable)
         ],
-        exports={name: EXPORTERS[name].text(mount) for name in SHOWN_EXPORTS},
+        exports={name: checked_text(EXPORTERS[name], mount) for name in SHOWN_EXPORTS},
         **(optional | parts),
     )
 

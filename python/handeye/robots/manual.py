@@ -6,31 +6,25 @@ from pathlib import Path
 import numpy as np
 
 from handeye.errors import DeviceError, HandeyeError, InputError
-from handeye.robots.model import Arm
-from handeye.robots.notations import (
-    MAX_TEXT,
+from handeye.notations import (
+    NOTATIONS,
+    SHOWN,
     Notation,
+    Unit,
     example,
-    pose_numbers,
-    pose_of_numbers,
     pose_text,
     read_numbers,
     read_pose_text,
 )
+from handeye.notations.text import MAX_TEXT
+from handeye.robots.model import Arm
 from handeye.robots.protocol import Goal, Reading
 from handeye.robots.reading import checked_reading
 from handeye.types import Pose
 from handeye.types.arrays import FloatArray
 
 SKIP = frozenset({"skip", "no", "s"})
-# What a pendant shows, and what is typed off it.
-UNITS = {
-    Notation.UR: "mm and a rotation vector in rad as on the pendant, or p[..] in m and rad",
-    Notation.KUKA: "mm and deg",
-    Notation.FANUC: "mm and deg",
-    Notation.ABB: "mm and a quaternion",
-    Notation.EPSON: "mm and deg",
-}
+UR = NOTATIONS["ur"]
 # A flange is not as near to the middle of its base, or farther away than its links are long and this.
 _NEAREST_M, _SLACK_M = 0.01, 0.5
 
@@ -46,6 +40,8 @@ class ManualRobot:
         Shows a text.
     notation
         How the pose is read back; goals are shown in it first.
+    unit
+        Unit of its lengths; None for that of the notation, which for UR is what the pendant shows.
     arm
         Description of the arm, by which what was typed is checked; joints are asked for and shown only then.
     joints_told
@@ -62,15 +58,16 @@ class ManualRobot:
         self,
         ask: Callable[[str], str],
         tell: Callable[[str], None],
-        notation: Notation = Notation.UR,
+        notation: Notation = UR,
         *,
+        unit: Unit | None = None,
         arm: Arm | None = None,
         joints_told: bool | None = None,
-        notations: Sequence[Notation] = tuple(Notation),
+        notations: Sequence[Notation] = SHOWN,
     ) -> None:
         self._ask = ask
         self._tell = tell
-        self._notation = notation
+        self._notation, self._unit = notation, unit
         self._notations = [notation, *(other for other in notations if other is not notation)]
         self._arm = arm
         self._joints_told = joints_told if arm is not None else False
@@ -116,13 +113,15 @@ class ManualRobot:
 
     def _read(self, question: str, shown: Sequence[float] | None, also: str = "") -> Reading | None:
         """Return what is typed, None where that may be and is nothing."""
-        prompt = f"{question} ({self._notation}: {UNITS[self._notation]}; {also}or skip): "
+        prompt = (
+            f"{question} ({self._notation.name}: {units_of(self._notation, self._unit)}; {also}or skip): "
+        )
         while True:
             text = self._answer(prompt)
             if not text and also:
                 return None
             try:
-                reading = Reading(self._plausible(typed_pose(_or_file(text), self._notation)))
+                reading = Reading(self._plausible(typed_pose(_or_file(text), self._notation, self._unit)))
                 if self._arm is None:
                     return reading
                 joints = self._joints(self._arm, shown)
@@ -131,7 +130,7 @@ class ManualRobot:
             except HandeyeError as error:
                 if error.code in {"motion_refused", "no_answer"}:
                     raise
-                self._tell(f"{error.message}; a pose is written as {example(self._notation)}")
+                self._tell(f"{error.message}; a pose is written as {example(self._notation, self._unit)}")
 
     def _joints(self, arm: Arm, shown: Sequence[float] | None) -> tuple[float, ...] | None:
         if self._joints_told is False:
@@ -175,7 +174,7 @@ class ManualRobot:
             return pose
         raise InputError(
             f"the flange would be {1e3 * far:.4g} mm from the base, and {self._arm.name} is within "
-            f"{1e3 * reach:.0f} mm; expected {UNITS[self._notation]}",
+            f"{1e3 * reach:.0f} mm; expected {units_of(self._notation, self._unit)}",
             code="out_of_reach",
         )
 
@@ -203,21 +202,27 @@ def joints_of_numbers(arm: Arm, numbers: Sequence[float]) -> FloatArray:
     return np.where(arm.sliding, values / 1e3, np.deg2rad(values))
 
 
-def typed_pose(text: str, notation: Notation) -> Pose:
-    """Return the pose that was typed, in the units of the pendant (see `UNITS`).
+def units_of(notation: Notation, unit: Unit | None = None) -> str:
+    """Return the units in which a pose is typed, in words."""
+    if notation is UR and unit is None:
+        return "mm and a rotation vector in rad as on the pendant, or p[..] in m and rad"
+    return f"{(unit or notation.default_unit).value} and {notation.form.words}"
+
+
+def typed_pose(text: str, notation: Notation, unit: Unit | None = None) -> Pose:
+    """Return the pose that was typed, in the units of the pendant (see `units_of`).
 
     Raises
     ------
     InputError
         Not the numbers of one pose.
     """
-    if notation is not Notation.UR or "p[" in text.replace(" ", "").lower():
-        return read_pose_text(text, notation)
-    numbers = read_numbers(text)
-    return pose_of_numbers([*(value / 1e3 for value in numbers[:3]), *numbers[3:]], notation)
+    if notation is UR and unit is None and "p[" not in text.replace(" ", "").lower():
+        unit = Unit.MM
+    return read_pose_text(text, notation, unit)
 
 
-def describe(goal: Goal, notations: Sequence[Notation], sliding: Sequence[bool] = ()) -> str:
+def describe(goal: Goal, notations: Sequence[Notation] = SHOWN, sliding: Sequence[bool] = ()) -> str:
     """Return where to go, in joint values where they are known, and in the notations of several makers."""
     lines = [f"Go to {goal.label}:"]
     if goal.joints_rad is not None:
@@ -228,13 +233,11 @@ def describe(goal: Goal, notations: Sequence[Notation], sliding: Sequence[bool] 
         units = "deg, mm where they slide" if any(slides) else "deg"
         lines.append("  joints " + "  ".join(f"{value:.3f}" for value in values) + f"  {units}")
     for notation in notations:
-        units = "" if notation is Notation.UR else "  mm, deg"
-        if notation is Notation.ABB:
-            units = "  mm, quaternion"
-        lines.append(f"  {notation:<6} {pose_text(goal.T_base_flange, notation)}{units}")
-        if notation is Notation.UR:
+        units = "" if notation is UR else f"  {notation.default_unit.value}, {notation.form.words}"
+        lines.append(f"  {notation.name:<6} {pose_text(goal.T_base_flange, notation)}{units}")
+        if notation is UR:
             # Adding zero turns a negative zero into a plain one.
-            x, y, z, rx, ry, rz = (round(v, 5) + 0.0 for v in pose_numbers(goal.T_base_flange, notation))
+            x, y, z, rx, ry, rz = (round(v, 5) + 0.0 for v in notation.numbers(goal.T_base_flange))
             lines.append(
                 f"         X {1e3 * x:.2f}  Y {1e3 * y:.2f}  Z {1e3 * z:.2f}  mm   "
                 f"RX {rx:.4f}  RY {ry:.4f}  RZ {rz:.4f}  rad (pendant)"

@@ -18,9 +18,9 @@ from handeye.cameras.replay import ReplayCamera
 from handeye.datasets.images import read_image
 from handeye.errors import DeviceError, InputError, printable
 from handeye.importing import Opened, open_folder
+from handeye.notations import notation_of, unit_of
 from handeye.robots import Arm
 from handeye.robots.manual import ManualRobot
-from handeye.robots.notations import Notation
 from handeye.robots.protocol import Robot
 from handeye.robots.replay import ReplayRobot
 from handeye.session.calls import MAX_MESSAGE
@@ -43,7 +43,7 @@ class Person:
 def open_robot(
     spec: str, person: Person, arm: Arm | None = None, *, joints_told: bool | None = None
 ) -> Robot:
-    """Return the robot of a specification: `manual`, `manual:kuka`, `replay:FOLDER` or `NAME:ADDRESS`.
+    """Return the robot of a specification: `manual:kuka`, `manual:ur/mm`, `replay:FOLDER` or `NAME:ADDRESS`.
 
     `arm` and `joints_told` are for a person who moves the arm, see `ManualRobot`.
 
@@ -56,13 +56,15 @@ def open_robot(
     """
     name, _, address = spec.partition(":")
     if name == MANUAL:
-        try:
-            notation = Notation(address or Notation.UR)
-        except ValueError:
-            raise InputError(
-                f"notation {address!r}, expected one of {', '.join(Notation)}", code="unknown_notation"
-            ) from None
-        return ManualRobot(person.ask, person.tell, notation, arm=arm, joints_told=joints_told)
+        name, _, unit = address.partition("/")
+        return ManualRobot(
+            person.ask,
+            person.tell,
+            notation_of(name or "ur"),
+            unit=unit_of(unit) if unit else None,
+            arm=arm,
+            joints_told=joints_told,
+        )
     if name == REPLAY:
         return ReplayRobot(open_folder(address).recording.views)
     return _announced(ROBOT_GROUP, name, address, ROBOTS, Robot)

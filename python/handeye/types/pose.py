@@ -29,8 +29,8 @@ class Pose:
     ----------
     matrix
         (4, 4) homogeneous matrix, translation in metres. Rounding of the rotation (a deviation from
-        orthogonality up to 1e-4, as in files with four written digits) is repaired by the nearest rotation;
-        a matrix that is rigid to 1e-12 is kept bit for bit.
+        orthogonality up to 1e-4, or as large as the three or four written decimals of its entries explain)
+        is repaired by the nearest rotation; a matrix that is rigid to 1e-12 is kept bit for bit.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class Pose:
                 hint="check the order and the signs of the axes",
             )
         if not _is_rigid(given):
-            given = finite_array(_core.nearest_rigid(given), (4, 4), "pose")
+            given = finite_array(_core.nearest_rigid(_unrounded(given)), (4, 4), "pose")
         self._matrix = given
 
     @classmethod
@@ -221,6 +221,25 @@ class Pose:
         x, y, z = self.translation
         qx, qy, qz, qw = self.quaternion_xyzw
         return f"Pose([{x:.6g}, {y:.6g}, {z:.6g}] m, xyzw [{qx:.6g}, {qy:.6g}, {qz:.6g}, {qw:.6g}])"
+
+
+def _unrounded(matrix: FloatArray) -> FloatArray:
+    """Return a matrix whose rotation was written with few decimals, with the nearest rotation in its place.
+
+    Entries off by half a unit of the last decimal leave a row or column of a rotation, and two of them with
+    each other, off by at most sqrt(3) of that unit; the squares of the errors are left room for.
+    """
+    rotation = matrix[:3, :3]
+    for unit in (1e-4, 1e-3):
+        rounded = np.round(rotation / unit) * unit
+        with np.errstate(over="ignore", invalid="ignore"):
+            deviation = np.abs(rotation.T @ rotation - np.eye(3)).max()
+        if np.abs(rounded - rotation).max() < 1e-12 and deviation <= 1.01 * math.sqrt(3.0) * unit:
+            left, _, right = np.linalg.svd(rotation)
+            nearest = matrix.copy()
+            nearest[:3, :3] = left @ right
+            return nearest
+    return matrix
 
 
 def through_twist(points: FloatArray, in_point: FloatArray) -> FloatArray:

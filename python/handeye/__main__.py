@@ -1,0 +1,5 @@
+"""`python -m handeye`: the command line."""
+
+from handeye.cli import main
+
+main()

@@ -1,0 +1,88 @@
+"""Poses of the robot and of the target, without pictures: what somebody else's detector has measured."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from handeye.datasets.plausibility import DataWarning
+from handeye.errors import InputError
+from handeye.types import Mounting, Pose
+from handeye.types.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class PosePair:
+    """What robot and camera say of one station.
+
+    Parameters
+    ----------
+    name
+        Name of the view.
+    T_base_flange
+        Pose of the flange in the robot base.
+    T_camera_target
+        Pose of the target in the camera.
+    """
+
+    name: str
+    T_base_flange: Pose
+    T_camera_target: Pose
+
+
+@dataclass(frozen=True, eq=False)
+class PosePairs:
+    """Stations of one target and one camera, measured as poses.
+
+    Attributes
+    ----------
+    name
+        Name of the set.
+    layout
+        Name of the layout it was read from.
+    mounting
+        Where the camera sits.
+    pairs
+        The stations, in the order of the file.
+    source
+        Where the data came from, in words.
+    warnings
+        Values that are possible but hardly meant, and choices that the file left open.
+
+    Raises
+    ------
+    InputError
+        No station at all, or two of one name.
+    """
+
+    name: str
+    layout: str
+    mounting: Mounting
+    pairs: tuple[PosePair, ...]
+    source: str = ""
+    warnings: tuple[DataWarning, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.pairs:
+            raise InputError(f"{self.name}: no samples", code="no_poses")
+        if len({pair.name for pair in self.pairs}) < len(self.pairs):
+            raise InputError(f"{self.name}: two samples of one name", code="duplicate_view")
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    @property
+    def motions(self) -> FloatArray:
+        """(N, 4, 4) A of the chain of each station."""
+        return np.array([self.mounting.chain(pair.T_base_flange).matrix for pair in self.pairs])
+
+    @property
+    def camera_poses(self) -> FloatArray:
+        """(N, 4, 4) `T_camera_target` of each station."""
+        return np.array([pair.T_camera_target.matrix for pair in self.pairs])
+
+
+def numbered(poses: Sequence[tuple[Pose, Pose]]) -> tuple[PosePair, ...]:
+    """Return stations named by their place, counted from one."""
+    width = max(2, len(str(len(poses))))
+    return tuple(PosePair(f"sample_{k:0{width}d}", *pair) for k, pair in enumerate(poses, start=1))

@@ -1,0 +1,29 @@
+"""A recording that was written counts once it was read back and compared."""
+
+import os
+
+from handeye.datasets.recording_format import read_recording
+from handeye.errors import InputError, OutputError
+from handeye.types import Recording
+
+
+def check_written(recording: Recording, folder: str | os.PathLike[str]) -> None:
+    """Read a recording that was just written back, and compare it.
+
+    Raises
+    ------
+    OutputError
+        It cannot be read or is not the same, but for images that were not copied and their names.
+    """
+    try:
+        back = read_recording(folder).recording
+    except InputError as error:
+        raise OutputError(f"{folder}: does not read back: {error.message}", code="not_exact") from error
+    if _comparable(back) != _comparable(recording):
+        raise OutputError(f"{folder}: does not read back as it was written", code="not_exact")
+
+
+def _comparable(recording: Recording) -> tuple[object, ...]:
+    views = [{**view.to_dict(), "image": None} for view in recording.views]
+    r = recording
+    return r.name, r.mounting, r.camera, r.target, r.truth, r.source, views

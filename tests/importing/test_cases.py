@@ -1,0 +1,91 @@
+"""Inputs that once went wrong, with the right value; see the README beside them."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from handeye.datasets import Statement, read_camera
+from handeye.errors import InputError, UnstatedError
+from handeye.importing import SourceOptions, open_folder
+from handeye.notations import NOTATIONS, Unit
+from handeye.solving import solve
+from handeye.types import Charuco
+
+DATA = os.environ.get("HANDEYE_DATA")
+CASES = Path(DATA or ".") / "cases"
+pytestmark = pytest.mark.skipif(
+    DATA is None or not CASES.is_dir(),
+    reason="HANDEYE_DATA is not set: it names the folder with the public recordings and the cases",
+)
+# The board file in that folder describes another board than its pictures show.
+BOARD = Charuco(8, 11, 0.020, 0.015, "DICT_5X5_100")
+
+
+def position_mm(folder: Path, options: SourceOptions | None = None) -> list[float]:
+    calibration = solve(open_folder(folder, options).recording)
+    return (1e3 * calibration.results["T_flange_camera"].translation).tolist()
+
+
+@pytest.mark.parametrize(("file", "notation"), [("poses.csv", "ur"), ("poses_kuka.csv", "kuka")])
+def test_folder_with_pose_list(file: str, notation: str) -> None:
+    folder = CASES / "folder_with_pose_list"
+    options = SourceOptions(target=BOARD, poses=file, stated=Statement(NOTATIONS[notation], Unit.MM))
+    assert position_mm(folder, options) == pytest.approx([31, -64, 87], abs=0.3)
+    with pytest.raises(UnstatedError) as caught:
+        open_folder(folder, SourceOptions(target=BOARD, poses=file))
+    assert caught.value.options == ("--poses", file, "--notation", notation, "--unit", "mm")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "camera_info_parsers.yaml",
+        "empty_model_no_coeffs.yaml",
+        "inverse_brown.yaml",
+        "kalibr_camchain.yaml",
+        "no_coeffs_plumb_bob.yaml",
+        "opencv_filestorage.yml",
+        "plumb_bob_4.yaml",
+        "rational8.yaml",
+        "realsense_intrinsics.json",
+        "ros1_rostopic_echo.yaml",
+        "ros2_topic_echo.yaml",
+    ],
+)
+def test_camera_files_of_others(name: str) -> None:
+    folder = CASES / "camera_files_of_others"
+    camera = read_camera(folder / "camfiles" / name)
+    assert camera.parameters[:4].tolist() == [1200, 1200, 639.5, 511.5]
+    assert position_mm(folder / "camfile_base", SourceOptions(camera=camera)) == pytest.approx(
+        [-70, 10, 60], abs=0.5
+    )
+
+
+def test_a_camera_that_was_never_calibrated_is_named() -> None:
+    with pytest.raises(InputError, match="never calibrated"):
+        read_camera(CASES / "camera_files_of_others" / "camfiles" / "all_zero.yaml")
+    equidistant = read_camera(CASES / "camera_files_of_others" / "camfiles" / "equidistant.yaml")
+    assert equidistant.lens == "kannala_brandt"
+
+
+def test_camera_info_trailing_dots() -> None:
+    folder = CASES / "camera_info_trailing_dots"
+    camera = read_camera(folder / "camera_info_parsers.yaml")
+    assert position_mm(folder / "camfile_base", SourceOptions(camera=camera)) == pytest.approx(
+        [-70, 10, 60], abs=0.5
+    )
+
+
+def test_camera_of_another_size() -> None:
+    folder = CASES / "camera_of_another_size"
+    options = SourceOptions(pattern=(6, 9), camera=read_camera(folder / "camera_1920x1536.toml"))
+    with pytest.raises(InputError, match="1920 x 1536") as caught:
+        open_folder(folder / "views", options)
+    assert caught.value.code == "image_size"
+
+
+def test_poses_four_decimals(tmp_path: Path) -> None:
+    folder = shutil.copytree(CASES / "poses_four_decimals" / "round_4", tmp_path / "round_4")
+    assert position_mm(folder) == pytest.approx([-70, 10, 60], abs=1.0)

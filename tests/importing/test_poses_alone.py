@@ -1,0 +1,68 @@
+"""X and Y from poses alone."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commands import Handeye
+from datasets.test_pose_pairs import X, easy_samples, moveit_samples, stations
+from handeye.datasets import PosePairs
+from handeye.datasets.pose_pairs import numbered
+from handeye.errors import DegenerateError, InputError, SolveError
+from handeye.importing import open_folder, solve_poses
+from handeye.types import Mounting, Pose
+
+
+def noisy(mounting: Mounting, sigma: float, count: int = 12, seed: int = 1) -> PosePairs:
+    rng = np.random.default_rng(seed)
+    poses = [(pose, Pose.exp(rng.normal(0, sigma, 6)) @ seen) for pose, seen in stations(mounting, count)]
+    return PosePairs("noisy", "test", mounting, numbered(poses))
+
+
+@pytest.mark.parametrize("mounting", Mounting)
+def test_exact_poses_give_the_truth(mounting: Mounting) -> None:
+    solved = solve_poses(noisy(mounting, 0.0))
+    assert np.abs(solved.X.matrix - X.matrix).max() < 1e-4
+    assert solved.rms_m < 1e-4
+
+
+@pytest.mark.parametrize("mounting", Mounting)
+def test_noise_shows_in_the_misfit(mounting: Mounting) -> None:
+    errors = []
+    for seed in range(20):
+        solved = solve_poses(noisy(mounting, 1e-3, seed=seed))
+        assert 0.5e-3 < solved.rms_m < 3e-3
+        errors.append(np.linalg.norm((solved.X.inverse() @ X).translation))
+    assert np.median(errors) < 2e-3
+
+
+def test_what_cannot_be_solved_is_refused() -> None:
+    good = noisy(Mounting.EYE_IN_HAND, 0.0)
+    with pytest.raises(InputError, match="at least 3"):
+        solve_poses(PosePairs("few", "test", good.mounting, good.pairs[:2]))
+    shuffled = numbered(
+        [(p.T_base_flange, q.T_camera_target) for p, q in zip(good.pairs, good.pairs[::-1], strict=True)]
+    )
+    with pytest.raises((SolveError, DegenerateError), match=r"contradict|do not report the same"):
+        solve_poses(PosePairs("shuffled", "test", good.mounting, shuffled))
+    slid = [(Pose.exp([0.1 * k, 0, 0, 0, 0, 0]), Pose.exp([0.1 * k, 0, 0.5, 0, 0, 0])) for k in range(6)]
+    with pytest.raises(DegenerateError):
+        solve_poses(PosePairs("slid", "test", good.mounting, numbered(slid)))
+
+
+def test_the_command_answers_and_says_what_it_lacks(tmp_path: Path, handeye: Handeye) -> None:
+    path = tmp_path / "demo.samples"
+    path.write_text(easy_samples(Mounting.EYE_TO_HAND))
+    answer = handeye.json("solve", str(path), "--mounting", "eye_to_hand")
+    assert np.abs(np.array(answer["T_base_camera"]) - X.inverse().matrix).max() < 1e-4
+    assert "no accuracy can be stated" in answer["warnings"][-1]
+    with pytest.raises(InputError, match="without pictures"):
+        open_folder_of_samples(tmp_path)
+    assert json.dumps(answer)
+
+
+def open_folder_of_samples(folder: Path) -> None:
+    (folder / "samples.yaml").write_text(moveit_samples(stations(Mounting.EYE_IN_HAND)))
+    open_folder(folder / "samples.yaml")
