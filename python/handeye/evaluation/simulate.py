@@ -349,18 +349,17 @@ def _mixed(random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: Float
         level = {name: _level(random, range_) for name, range_ in bounds.items()}
     if kind is ErrorKind.MIXTURE_CELL_2:
         level = {name: 2 * value for name, value in level.items()}
-    offsets = float(np.deg2rad(level["offset_deg"])) * random.standard_normal(joints.shape[1])
+    offsets = float(np.deg2rad(level["offset_deg"])) * random.standard_normal(len(arm))
     offsets[[0, -1]] = 0.0
     twist_rad = float(np.deg2rad(level["twist_deg"]))
     built = displaced(arm, random_displacements(random, arm, level["length_m"], twist_rad))
-    noise: FloatArray = float(np.deg2rad(level["encoder_deg"])) * random.standard_normal(joints.shape)
-    play: FloatArray = 0.5 * float(np.deg2rad(level["play_deg"])) * np.sign(random.standard_normal(joints.shape))
+    noise = float(np.deg2rad(level["encoder_deg"])) * random.standard_normal(joints.shape)
+    play = 0.5 * float(np.deg2rad(level["play_deg"])) * np.sign(random.standard_normal(joints.shape))
     both = [
         _core.se3_exp(np.array([_twist(random, level["pose_m"], level["pose_deg"]) for _ in joints]))
         for _ in range(2)
     ]
-    moved: FloatArray = joints + offsets + noise - play
-    return both[0] @ built.forward(moved) @ both[1]
+    return both[0] @ built.forward(joints + offsets + noise - play) @ both[1]
 
 
 def _reported(

@@ -98,14 +98,15 @@ def _at_flange(noise: StationNoise, measurements: Measurements, arm: ArmModel | 
     """Deviation per axis of the flange's translation (metres) and rotation (radians), root mean square."""
     positions = np.array([view.T_base_flange.translation for view in measurements.views]).reshape(-1, 3)
     reach = float(np.mean(np.sum(np.square(positions), axis=1)))
-    variances: FloatArray = np.square(np.array([*noise.flange])) + np.square(np.array([*noise.base]))
     # |w x p|^2 of a turn w of the base is on average two thirds of |w|^2 |p|^2.
-    variances[0] += 2 / 3 * noise.base[1] ** 2 * reach
+    translation = noise.flange[0] ** 2 + noise.base[0] ** 2 + 2 / 3 * noise.base[1] ** 2 * reach
+    rotation = noise.flange[1] ** 2 + noise.base[1] ** 2
     if arm is not None:
         by_joint = arm.at_flange(measurements.joints)[0] * arm.scales * noise.joint_rad
         squares = np.mean(np.sum(np.square(by_joint), axis=2), axis=0)
-        variances = variances + np.array([float(squares[:3].mean()), float(squares[3:].mean())])
-    return float(np.sqrt(variances[0])), float(np.sqrt(variances[1]))
+        translation += float(squares[:3].mean())
+        rotation += float(squares[3:].mean())
+    return float(np.sqrt(translation)), float(np.sqrt(rotation))
 
 
 def attribution(

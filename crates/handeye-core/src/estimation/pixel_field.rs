@@ -44,7 +44,7 @@ pub(super) fn slow_residuals(
         return SlowResiduals::default();
     }
     let features = &problem.features()[samples.clone()];
-    let (centre, half) = extent(features.iter().map(|f| [f.position.x, f.position.y]));
+    let (centre, half) = extent(&features.iter().map(|f| [f.position.x, f.position.y]));
     let width = (columns + 1).next_multiple_of(MAX_LANES);
     let mut rows = vec![0.0; 2 * samples.len() * width];
     let points = features.iter().zip(&problem.pixels()[samples]);
@@ -103,7 +103,7 @@ fn eliminate(gram: &mut [f64], width: usize, columns: usize, fitted: usize) -> S
 }
 
 /// Middle and half size of points in both coordinates; never nothing.
-fn extent(points: impl Iterator<Item = [f64; 2]> + Clone) -> ([f64; 2], [f64; 2]) {
+fn extent(points: &(impl Iterator<Item = [f64; 2]> + Clone)) -> ([f64; 2], [f64; 2]) {
     let mut centre = [0.0; 2];
     let mut half = [1.0; 2];
     for axis in 0..2 {
