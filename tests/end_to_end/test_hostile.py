@@ -218,7 +218,7 @@ def test_image_that_is_none(refused: Refused, set_of_pictures: Path) -> None:
 def test_wrong_pattern_size(refused: Refused, set_of_pictures: Path) -> None:
     error = refused(set_of_pictures, "--rows", "6", "--columns", "9", commands="solve import")
     assert (error["exit_code"], error["code"]) == (5, "not_detected")
-    assert "inner corners is visible, expected 9 x 6" in str(error["message"])
+    assert "the picture shows another board: Chessboard, 5 x 7 inner corners" in str(error["message"])
 
 
 def test_pattern_not_given(refused: Refused, set_of_pictures: Path) -> None:

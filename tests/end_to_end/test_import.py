@@ -50,4 +50,7 @@ def test_recording_with_another_camera(handeye: Handeye, tmp_path: Path) -> None
     )
     data = handeye.json("import", folder, tmp_path / "new", "--camera", camera)
     assert data["camera"]["lens"] == "pinhole"
-    assert handeye.json("solve", tmp_path / "new")["camera"]["lens"] == "pinhole"
+    # No distortion is no measured distortion: the lens is found, unless it is held.
+    assert handeye.json("solve", tmp_path / "new")["camera"]["lens"] == "brown_conrady_5"
+    held = handeye.json("solve", tmp_path / "new", "--camera-fixed")["camera"]
+    assert (held["lens"], held["parameters"]) == ("pinhole", [1400.0, 1400.0, 640.0, 512.0])

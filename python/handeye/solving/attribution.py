@@ -20,7 +20,7 @@ from handeye.types.calibration import Finding, Noise, RobotSide
 DECISIVE = 5.0
 # Something that can be put right (camera, board, clocks) is worth a word at this share of the misfit, or of
 # what the likelihood would lose with an exact robot.
-CONVINCING_SHARE, NEEDED_SHARE = 0.3, 0.15
+CONVINCING_SHARE, NEEDED_SHARE = 0.3, 0.1
 # Focal lengths and principal point come first.
 _PARAMETERS_IN_PX = 4
 _SIDES = {
@@ -97,7 +97,7 @@ def noise_of(
 def _at_flange(noise: StationNoise, measurements: Measurements, arm: ArmModel | None) -> tuple[float, float]:
     """Deviation per axis of the flange's translation (metres) and rotation (radians), root mean square."""
     positions = np.array([view.T_base_flange.translation for view in measurements.views]).reshape(-1, 3)
-    reach = float(np.mean(np.sum(np.square(positions), axis=1)))
+    reach = float((positions**2).sum(axis=1).mean())
     # |w x p|^2 of a turn w of the base is on average two thirds of |w|^2 |p|^2.
     translation = noise.flange[0] ** 2 + noise.base[0] ** 2 + 2 / 3 * noise.base[1] ** 2 * reach
     rotation = noise.flange[1] ** 2 + noise.base[1] ** 2

@@ -20,6 +20,7 @@ from handeye.planning import Planner
 from handeye.planning.collisions import Body
 from handeye.planning.constraints import ViewConstraints
 from handeye.planning.feasibility import Generator as CandidateGenerator
+from handeye.planning.prediction import Prediction
 from handeye.robots import Arm
 from handeye.session import attempt, choosing, loop, taking
 from handeye.session.calls import Calls
@@ -28,7 +29,7 @@ from handeye.session.deciding import Step
 from handeye.session.entry import Entry
 from handeye.session.settings import Collisions, Configuration
 from handeye.session.store import SessionStore
-from handeye.solving import Estimate, Estimator, Measurements
+from handeye.solving import Estimator, Measurements
 
 ARM = "ur5e"
 VIEWS, QUICK_VIEWS = 14, 5
@@ -48,7 +49,7 @@ _STAGES: tuple[tuple[str, object, str], ...] = (
     ("kinematics", Arm, "inverse_all"),
     ("collisions", Body, "obstacles"),
     ("collisions", Body, "obstacle_on_path"),
-    ("scoring", Estimate, "gains"),
+    ("scoring", Prediction, "gains"),
     ("refinement", choosing, "refine"),
     ("choice", Planner, "ask"),
     ("writing", taking, "encoded"),
