@@ -29,6 +29,9 @@ mod twists;
 mod view_sets;
 mod weak_prior;
 
+#[cfg(test)]
+mod tests;
+
 pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station};
 pub use cell_start::{CellStart, start_of_cell};
 pub use components::Assumptions;
