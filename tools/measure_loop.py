@@ -27,13 +27,20 @@ from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import EndReason
 from handeye.session.faults import FaultRates
 from handeye.session.settings import Configuration, Simulation
+from handeye.session.simulated import usual_errors
 from handeye.types import Mounting
 
 MODELLED = ("none", "white_flange", "white_base", "encoder", "joint_offsets")
-KINDS = (*MODELLED, "links")
+MIXTURES = {"mixture": 1.0, "mixture_2": 2.0}
+KINDS = (*MODELLED, "links", *MIXTURES)
 ARMS = ("epson_c4l", "ur5e")
 FAULTS = tuple(FaultRates.__dataclass_fields__)
 ASKED_MM, ASKED_DEG = 0.5, 0.05
+
+
+def scaled(factor: float) -> ArmErrors:
+    """Return the errors of an arm in good order times a factor."""
+    return ArmErrors(**{name: factor * value for name, value in vars(usual_errors()).items()})
 
 
 def cell(kind: str, number: int) -> Configuration:
@@ -52,6 +59,7 @@ def cell(kind: str, number: int) -> Configuration:
         "encoder": ArmErrors(encoder_sigma_rad=float(np.deg2rad(level(0.003, 0.03)))),
         "joint_offsets": ArmErrors(offset_sigma_rad=radians),
         "links": ArmErrors(length_sigma_m=metres, twist_sigma_rad=radians),
+        **{name: scaled(factor) for name, factor in MIXTURES.items()},
     }[kind]
     return Configuration(
         ARMS[number % 2],
@@ -116,6 +124,7 @@ def main() -> int:
         "--no-refine", action="store_true", help="take the best candidate drawn, climb to no better one"
     )
     parser.add_argument("--views", type=int, help="take so many views whatever is reached")
+    parser.add_argument("--policy", default="next_best_view", help="what chooses the views")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
     parser.add_argument("--output", type=Path, required=True)
     options = parser.parse_args()
@@ -138,7 +147,9 @@ def main() -> int:
                         calm = replace(configuration.simulation, faults=None)
                         line["undisturbed"] = run(replace(configuration, simulation=calm))
                 else:
-                    configuration = replace(cell(kind, number), refine=not options.no_refine)
+                    configuration = replace(
+                        cell(kind, number), refine=not options.no_refine, policy=options.policy
+                    )
                     if options.views is not None:
                         configuration = replace(configuration, accuracy_mm=None, most_views=options.views)
                     line |= run(configuration)
@@ -169,6 +180,8 @@ def _sum_up(lines: list[dict[str, Any]]) -> None:
             f"{failed} failed attempts, longest {max(e['seconds'] for e in some):.0f} s"
         )
         errors, reached_mm = ([line[key] for line in some if key in line] for key in ("mm", "promised_mm"))
+        inside = sum(line["mm"] <= line["promised_mm"] for line in some if "mm" in line)
+        print(f"  mean error {np.mean(errors):.3f} mm, inside the stated radius {inside} of {len(errors)}")
         first = [line["gains"][0] for line in some if line.get("gains")]
         if errors and first:
             print(

@@ -457,8 +457,10 @@ impl Mixed {
         for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| q.recurring) {
             scales[q.first - p..q.first - p + q.count].fill(*s);
         }
-        let mut shared = DMatrix::zeros(p, recurring);
-        let mut own = DMatrix::zeros(p, p);
+        let mut shared = DMatrix::<f64>::zeros(p, recurring);
+        let narrow = p.next_multiple_of(MAX_LANES);
+        let mut of_station = vec![0.0; recurring * narrow];
+        let mut own = vec![0.0; p.next_multiple_of(TOGETHER) * narrow];
         let n = self.size;
         let mut sum = vec![0.0; (n + 1).next_multiple_of(TOGETHER) * self.width];
         let mut here = vec![0.0; sum.len()];
@@ -471,9 +473,14 @@ impl Mixed {
             for (total, one) in sum.iter_mut().zip(&here) {
                 *total += one;
             }
-            let z = DMatrix::from_fn(p, recurring, |i, j| here[i * self.width + p + j] * scales[j]);
-            own.gemm(1.0, &z, &z.transpose(), 1.0);
-            shared += z;
+            for (j, scale) in scales.iter().enumerate() {
+                let row = &mut of_station[j * narrow..(j + 1) * narrow];
+                for (i, entry) in row[..p].iter_mut().enumerate() {
+                    *entry = here[i * self.width + p + j] * scale;
+                    shared[(i, j)] += *entry;
+                }
+            }
+            dispatch(self.unit, Accumulate { rows: &of_station, width: narrow, size: p, sum: &mut own });
         }
         for i in 0..p {
             right[i] -= sum[i * self.width + n];
@@ -487,6 +494,7 @@ impl Mixed {
         }
         let bread = Factor::new(&information)?.inverse();
         let theta = &bread * right;
+        let own = DMatrix::from_fn(p, p, |i, j| own[i.min(j) * narrow + i.max(j)]);
         let meat = &shared * shared.transpose() - own;
         evaluation.covariance = &bread + &bread * meat * &bread;
         evaluation.theta = theta;

@@ -11,9 +11,9 @@ use crate::se3::Se3;
 use crate::simd::{MAX_LANES, VectorUnit, dispatch};
 
 /// Highest power of a coordinate of the board.
-const DEGREE: i32 = 3;
+const DEGREE: i32 = 2;
 /// Polynomials of that degree in two coordinates.
-const POLYNOMIALS: usize = 10;
+const POLYNOMIALS: usize = 6;
 /// What is left of a column's square below this share is rounding.
 const INDEPENDENT: f64 = 1e-6;
 /// Fewest measurements beyond all that is fitted.

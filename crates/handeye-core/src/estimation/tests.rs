@@ -48,8 +48,8 @@ fn made(seed: u64, bodies: (&[Body], &[Body]), stations: usize, flange: f64, des
         let (joints, links) = (described.then(|| part(4)), described.then(|| part(2)));
         let twist = Vector6::from_fn(|_, _| random.normal()) * flange;
         cell.stations.push(Station { pose: reported * Se3::exp(&twist), joints, velocity: None, links });
-        for c in 0..x.len() {
-            for t in 0..y.len() {
+        for (c, of_camera) in x.iter().enumerate() {
+            for (t, of_target) in y.iter().enumerate() {
                 let measured = Measurement {
                     station: k,
                     camera: c,
@@ -69,7 +69,7 @@ fn made(seed: u64, bodies: (&[Body], &[Body]), stations: usize, flange: f64, des
                 };
                 cell.measurements.push(measured);
                 let last = cell.measurements.len() - 1;
-                let exact = x[c] * cell.middle(&cell.measurements[last]) * y[t];
+                let exact = *of_camera * cell.middle(&cell.measurements[last]) * *of_target;
                 let noise = Vector6::from_fn(|_, _| random.normal()) * PIXELS;
                 cell.measurements[last].pose.pose = Se3::exp(&noise) * exact;
             }
