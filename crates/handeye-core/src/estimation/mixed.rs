@@ -30,13 +30,16 @@ struct Prior {
     information: Option<DMatrix<f64>>,
     mean: Option<DVector<f64>>,
     recurring: bool,
+    /// Of recurring ones: covariances of the stations at a deviation of one.
+    squares: Vec<DMatrix<f64>>,
 }
 
 impl Prior {
     /// Of new parameters with columns of their own, whose place is not known yet.
     fn of_columns(of: &'static str, levels: Vec<usize>, columns: &[DMatrix<f64>], recurring: bool) -> Self {
         let count = columns.first().map_or(0, DMatrix::ncols);
-        Self { of, levels, first: 0, count, information: None, mean: None, recurring }
+        let squares = if recurring { columns.iter().map(square).collect() } else { vec![] };
+        Self { of, levels, first: 0, count, information: None, mean: None, recurring, squares }
     }
 
     fn range(&self) -> std::ops::Range<usize> {
@@ -52,10 +55,32 @@ impl Prior {
     }
 }
 
+/// `m m'`.
+fn square(m: &DMatrix<f64>) -> DMatrix<f64> {
+    m * m.transpose()
+}
+
+/// Adds a multiple of a matrix of the same shape.
+fn add(to: &mut DMatrix<f64>, factor: f64, m: &DMatrix<f64>) {
+    for (to, m) in to.as_mut_slice().iter_mut().zip(m.as_slice()) {
+        *to += factor * m;
+    }
+}
+
 struct Noise {
     of: &'static str,
     levels: Vec<usize>,
     roots: Vec<DMatrix<f64>>,
+    /// Their squares: covariances at a deviation of one.
+    squares: Vec<DMatrix<f64>>,
+}
+
+/// Rows of all stations in units of their noise.
+struct Whitened {
+    /// Cholesky factor of the covariance of each.
+    factors: Vec<DMatrix<f64>>,
+    /// Their rows, one after the other.
+    rows: Vec<f64>,
 }
 
 /// Rows of a station, as the kernels want them.
@@ -132,7 +157,10 @@ impl Mixed {
             for term in component.terms(cell, linearisation) {
                 let of: Vec<usize> = term.levels.iter().map(|l| first + l).collect();
                 match term.effect {
-                    Effect::Noise(roots) => noises.push(Noise { of: component.name(), levels: of, roots }),
+                    Effect::Noise(roots) => {
+                        let squares = roots.iter().map(square).collect();
+                        noises.push(Noise { of: component.name(), levels: of, roots, squares });
+                    }
                     Effect::Constant(columns) => {
                         blocks.push((Prior::of_columns(component.name(), of, &columns, false), columns));
                     }
@@ -147,6 +175,7 @@ impl Mixed {
                         information: Some(information),
                         mean: Some(mean),
                         recurring: false,
+                        squares: vec![],
                     }),
                 }
             }
@@ -225,17 +254,12 @@ impl Mixed {
         let prior: Vec<f64> = self.priors.iter().map(|x| Self::deviation(&x.levels, t)).collect();
         let mut sum = vec![0.0; (n + 1).next_multiple_of(TOGETHER) * self.width];
         let mut constant = 0.0;
-        let mut whitened: Vec<(DMatrix<f64>, Vec<f64>)> = Vec::with_capacity(self.stations.len());
-        for (k, station) in self.stations.iter().enumerate() {
-            let (factor, log_determinant) = self.factor(station, k, &noise, None)?;
-            let mut rows = station.rows.clone();
-            dispatch(self.unit, Whiten { factor: &factor, rows: &mut rows, width: self.width });
-            constant += log_determinant;
-            whitened.push((factor, rows));
-        }
-        for (_, rows) in &whitened {
-            dispatch(self.unit, Accumulate { rows, width: self.width, size: n + 1, sum: &mut sum });
-        }
+        let (whitened, log_determinant) = self.whitened(&noise, None)?;
+        constant += log_determinant;
+        dispatch(
+            self.unit,
+            Accumulate { rows: &whitened.rows, width: self.width, size: n + 1, sum: &mut sum },
+        );
         let entry = |i: usize, j: usize| sum[i.min(j) * self.width + i.max(j)];
         constant += entry(n, n);
         let mut information = self.given.clone();
@@ -310,6 +334,22 @@ impl Mixed {
         constant
     }
 
+    /// All stations' rows, whitened, and the logarithm of the determinant of their covariances; `prior` as in `factor`.
+    fn whitened(&self, noise: &[f64], prior: Option<&[f64]>) -> Option<(Whitened, f64)> {
+        let mut all = Whitened { factors: Vec::with_capacity(self.stations.len()), rows: Vec::new() };
+        let mut constant = 0.0;
+        for (k, station) in self.stations.iter().enumerate() {
+            let (factor, log_determinant) = self.factor(station, k, noise, prior)?;
+            constant += log_determinant;
+            let first = all.rows.len();
+            all.rows.extend_from_slice(&station.rows);
+            let rows = &mut all.rows[first..];
+            dispatch(self.unit, Whiten { factor: &factor, rows, width: self.width });
+            all.factors.push(factor);
+        }
+        Some((all, constant))
+    }
+
     /// Cholesky factor of a station's covariance, and the logarithm of its determinant. With `prior`, recurring errors
     /// count as new at the station.
     fn factor(
@@ -321,13 +361,11 @@ impl Mixed {
     ) -> Option<(DMatrix<f64>, f64)> {
         let mut covariance = station.pixels.clone();
         for (x, s) in self.noises.iter().zip(noise) {
-            let root = &x.roots[k];
-            covariance.gemm(s * s, root, &root.transpose(), 1.0);
+            add(&mut covariance, s * s, &x.squares[k]);
         }
         if let Some(prior) = prior {
             for (p, s) in self.priors.iter().zip(prior).filter(|(p, _)| p.recurring) {
-                let columns = station.columns(p, self.width);
-                covariance.gemm(s * s, &columns, &columns.transpose(), 1.0);
+                add(&mut covariance, s * s, &p.squares[k]);
             }
         }
         let factor = covariance.cholesky()?.unpack();
@@ -336,13 +374,7 @@ impl Mixed {
     }
 
     /// Slope and curvature.
-    fn differentiate(
-        &self,
-        whitened: &[(DMatrix<f64>, Vec<f64>)],
-        noise: &[f64],
-        prior: &[f64],
-        evaluation: &mut Evaluation,
-    ) {
+    fn differentiate(&self, whitened: &Whitened, noise: &[f64], prior: &[f64], evaluation: &mut Evaluation) {
         let n = self.size;
         let Evaluation { slope, curvature, theta, covariance, .. } = evaluation;
         let terms = self.noises.len() + self.priors.len();
@@ -362,8 +394,11 @@ impl Mixed {
                 u
             })
             .collect();
-        for (k, (factor, rows)) in whitened.iter().enumerate() {
+        let mut rest = &whitened.rows[..];
+        for (k, factor) in whitened.factors.iter().enumerate() {
             let size = self.stations[k].size;
+            let (rows, after) = rest.split_at(size * self.width);
+            rest = after;
             let b = DMatrix::from_row_slice(size, self.width, rows);
             let bs = DMatrix::from_vec(size, n, product_with(self.unit, rows, self.width, size, covariance));
             let b_of = b.columns(0, n);
@@ -459,29 +494,32 @@ impl Mixed {
         }
         let mut shared = DMatrix::<f64>::zeros(p, recurring);
         let narrow = p.next_multiple_of(MAX_LANES);
-        let mut of_station = vec![0.0; recurring * narrow];
-        let mut own = vec![0.0; p.next_multiple_of(TOGETHER) * narrow];
+        let tall = p.next_multiple_of(TOGETHER);
+        let mut own = vec![0.0; tall * narrow];
+        let mut sum = vec![0.0; tall * self.width];
         let n = self.size;
-        let mut sum = vec![0.0; (n + 1).next_multiple_of(TOGETHER) * self.width];
-        let mut here = vec![0.0; sum.len()];
-        for (k, station) in self.stations.iter().enumerate() {
-            let (factor, _) = self.factor(station, k, noise, Some(prior))?;
-            let mut rows = station.rows.clone();
-            dispatch(self.unit, Whiten { factor: &factor, rows: &mut rows, width: self.width });
+        let (whitened, _) = self.whitened(noise, Some(prior))?;
+        let rows = &whitened.rows;
+        dispatch(self.unit, Accumulate { rows, width: self.width, size: p, sum: &mut sum });
+        // What the recurring errors of each station do to the answer, a row for each of them.
+        let mut by_station = vec![0.0; self.stations.len() * recurring * narrow];
+        let mut here = vec![0.0; tall * self.width];
+        let mut first = 0;
+        for (station, by_station) in self.stations.iter().zip(by_station.chunks_exact_mut(recurring * narrow))
+        {
+            let end = first + station.size * self.width;
             here.fill(0.0);
-            dispatch(self.unit, Accumulate { rows: &rows, width: self.width, size: p, sum: &mut here });
-            for (total, one) in sum.iter_mut().zip(&here) {
-                *total += one;
-            }
-            for (j, scale) in scales.iter().enumerate() {
-                let row = &mut of_station[j * narrow..(j + 1) * narrow];
+            let rows = &whitened.rows[first..end];
+            dispatch(self.unit, Accumulate { rows, width: self.width, size: p, sum: &mut here });
+            first = end;
+            for ((j, scale), row) in scales.iter().enumerate().zip(by_station.chunks_exact_mut(narrow)) {
                 for (i, entry) in row[..p].iter_mut().enumerate() {
                     *entry = here[i * self.width + p + j] * scale;
                     shared[(i, j)] += *entry;
                 }
             }
-            dispatch(self.unit, Accumulate { rows: &of_station, width: narrow, size: p, sum: &mut own });
         }
+        dispatch(self.unit, Accumulate { rows: &by_station, width: narrow, size: p, sum: &mut own });
         for i in 0..p {
             right[i] -= sum[i * self.width + n];
             for j in i..p {

@@ -115,11 +115,14 @@ fn extent(points: &(impl Iterator<Item = [f64; 2]> + Clone)) -> ([f64; 2], [f64;
     (centre, half)
 }
 
+/// What the pose takes up of a smooth field is slower than what a parabola follows beyond it, and has more of its power.
+const SLOWER: f64 = 1.5;
 /// How far doubt goes before neighbours are taken to err alike, in standard deviations.
 const CERTAIN: f64 = 2.0;
 
-/// Factor by which the slow part of all views' residuals exceeds what points that err by themselves leave, given each
-/// view's own variance; one where that is within chance.
+/// Factor on the variances of the pixels for errors that neighbouring points share: by how much the slow part of all
+/// views' residuals exceeds what points that err by themselves leave, given each view's own variance; one where that is
+/// within chance.
 pub fn shared_error(views: &[(SlowResiduals, f64)]) -> f64 {
     let freedom: usize = views.iter().map(|(slow, _)| slow.freedom).sum();
     if freedom == 0 {
@@ -128,5 +131,5 @@ pub fn shared_error(views: &[(SlowResiduals, f64)]) -> f64 {
     let power: f64 = views.iter().map(|(slow, variance)| slow.squared_px / variance).sum();
     let factor = power / freedom as f64;
     let chance = 1.0 + CERTAIN * (2.0 / freedom as f64).sqrt();
-    if factor > chance { factor } else { 1.0 }
+    if factor > chance { 1.0 + SLOWER * (factor - 1.0) } else { 1.0 }
 }

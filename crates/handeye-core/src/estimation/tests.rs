@@ -206,6 +206,6 @@ fn neighbours_that_err_alike_are_told_from_chance() {
     let white = (SlowResiduals { squared_px: 14.0, freedom: 14 }, 1.0);
     let alike = (SlowResiduals { squared_px: 70.0, freedom: 14 }, 1.0);
     assert_eq!(shared_error(&[white; 8]), 1.0);
-    assert!((shared_error(&[alike; 8]) - 5.0).abs() < 1e-12);
+    assert!((shared_error(&[alike; 8]) - 7.0).abs() < 1e-12);
     assert_eq!(shared_error(&[]), 1.0);
 }
