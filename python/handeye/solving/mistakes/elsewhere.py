@@ -27,6 +27,11 @@ from handeye.solving.mistakes.sightings import Sightings
 CLEARLY_BETTER = 20.0
 # A factor of any value is less probable beforehand than a unit's, by this logarithm.
 ANY_SCALE = 8.0
+# Pictures that differ by more were taken at different places; the share of such views with one robot pose
+# that is no chance.
+STALE_M, STALE_RAD = 0.005, 0.02
+STALE_SHARE = 0.2
+MOST_NAMED = 4
 # No arm reaches so far and no board has such squares, at once.
 ENORMOUS_REACH_M = 20.0
 ENORMOUS_PITCH_M = 1.0
@@ -45,6 +50,36 @@ def refuse_enormous(measurements: Measurements) -> None:
             code="wrong_unit",
             hint="divide the translations of the robot poses and the measures of the target by 1000",
         )
+
+
+def refuse_stale(measurements: Measurements) -> None:
+    """Raise where robot poses were not read again: the same to the last digit though the pictures differ.
+
+    Raises
+    ------
+    InputError
+        At least `STALE_SHARE` of the views have the pose of another one; the message names them.
+    """
+    stale: list[tuple[str, str]] = []
+    views, poses = measurements.views, measurements.poses
+    for k, view in enumerate(views):
+        for j in range(k):
+            if views[j].T_base_flange != view.T_base_flange:
+                continue
+            moved = poses[k].T_camera_target @ poses[j].T_camera_target.inverse()
+            if np.linalg.norm(moved.translation) > STALE_M or moved.rotation_angle_rad > STALE_RAD:
+                stale.append((views[j].name, view.name))
+                break
+    if len(stale) < max(2, STALE_SHARE * len(views)):
+        return
+    words = ", ".join(f"{first} and {second}" for first, second in stale[:MOST_NAMED])
+    more = f" and {len(stale) - MOST_NAMED} more pairs" if len(stale) > MOST_NAMED else ""
+    raise InputError(
+        f"the robot poses of {words}{more} are the same to the last digit, though their pictures differ: the "
+        "pose was not read again",
+        code="inconsistent",
+        hint="read the robot's pose again at every picture, once the arm has come to rest",
+    )
 
 
 def _reach(measurements: Measurements) -> float:
@@ -101,7 +136,7 @@ def look_elsewhere(
         left = count - len(images)
         penalty = math.lgamma(count + 1) - left * _typical_mistake(first)
         # Where the others are enough to tell the rest by, these can be paired anew and used.
-        if len(moved) > count // 2 or not first.is_bearable:
+        if moved and (len(moved) > count // 2 or not first.is_bearable):
             consider(explanation.log_evidence - penalty, explanation, error)
     if best is not None:
         raise best[1]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from handeye.solving.measurements import Measurements, ViewPose
-from handeye.solving.mistakes.elsewhere import look_elsewhere, refuse_enormous
+from handeye.solving.mistakes.elsewhere import look_elsewhere, refuse_enormous, refuse_stale
 from handeye.solving.mistakes.explanation import Explanation, explain
 from handeye.solving.mistakes.naming import flipped_finding, lone_finding, pairing_words, shuffled_finding
 from handeye.solving.mistakes.noise_grid import noise_grid
@@ -70,6 +70,7 @@ def examine(measurements: Measurements) -> Examination:
     if len(measurements) < FEWEST_VIEWS:
         return Examination(measurements)
     refuse_enormous(measurements)
+    refuse_stale(measurements)
     measurements, of_points = without_gross_points(measurements)
     if len(measurements) < FEWEST_VIEWS:
         return Examination(measurements, of_points)
