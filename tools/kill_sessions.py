@@ -25,8 +25,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
+from handeye.notations import notation_of, pose_text, read_numbers
 from handeye.robots.manual import ManualRobot
-from handeye.robots.notations import Notation, pose_text, read_numbers
 from handeye.robots.protocol import Goal
 from handeye.robots.simulated import SimulatedArm
 from handeye.session.configuration import begin, prepare
@@ -62,7 +62,7 @@ class Typist:
         reading = self._arm.read_pose()
         if "joint positions" in question:
             return " ".join(f"{value:.6f}" for value in np.rad2deg(reading.joints_rad or ()))
-        return pose_text(reading.T_base_flange, Notation.UR)
+        return pose_text(reading.T_base_flange, notation_of("ur"))
 
 
 def run_by_hand(configuration: Configuration, folder: Path) -> None:
