@@ -102,7 +102,9 @@ def test_page_says_what_there_is_to_say(mounting: Mounting, model: ModelName) ->
         "handeye report cell",
         str(gathered.numbers.recipe.recording_sha256),
         "static_transform_publisher",
-        "robot and camera taken as exact" if model is ModelName.PAPER else "weighed by what the data say",
+        "robot and camera taken as exact"
+        if model is ModelName.PAPER
+        else "found together, by what the views say",
     ):
         assert said in reader.text, said
     for sentence in (*gathered.numbers.warnings, *(said.sentence[1:] for said in gathered.numbers.diagnosis)):

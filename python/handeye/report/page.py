@@ -27,9 +27,12 @@ _SIDES = {
 _SUSPECTS = {
     "robot_flange": "error of the robot, at the flange",
     "robot_base": "error of the robot, at the base",
-    "robot_joint_noise": "noise of the joints",
-    "robot_joint_offsets": "offsets of the joints",
-    "robot_links": "joints that sit wrongly on their links",
+    "posture_flange": "error of the robot, alike in like postures, at the flange",
+    "posture_base": "error of the robot, alike in like postures, at the base",
+    "joint_noise": "noise of the joints",
+    "joint_offsets": "offsets of the joints",
+    "links": "joints that sit wrongly on their links",
+    "time_lag": "lag between pictures and poses",
     "camera": "error of the camera's calibration",
     "board_scale": "error of the size of the board",
 }
@@ -168,7 +171,7 @@ def _camera_sentence(r: Report) -> str:
 def _model_sentence(r: Report) -> str:
     if r.model == "paper":
         return "paper: robot and camera taken as exact, so the stated accuracy is too good where they are not"
-    return "auto: the noise of robot and camera is weighed by what the data say"
+    return "auto: errors of robot, camera and board are found together, by what the views say"
 
 
 def _poses_used(r: Report) -> str:
