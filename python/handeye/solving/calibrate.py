@@ -14,7 +14,14 @@ from handeye.solving.paper import paper_estimate
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName, ViewResult
 from handeye.types.kinematics import Kinematics
+from handeye.types.mounting import Mounting
 from handeye.types.recording import Recording
+
+WHAT_NO_VIEW_SHOWS = (
+    "constant errors of the arm turn the whole base as a camera beside it sees it, and no view shows that: "
+    "the stated accuracy holds what such errors usually are; describe the arm and record its joints to have "
+    "them found"
+)
 
 
 def make_estimator(
@@ -151,7 +158,16 @@ def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibratio
         joint_offsets=estimate.joint_offsets,
         link_errors=estimate.link_errors,
         arm_correction=estimate.arm_correction,
+        warnings=_what_no_view_shows(estimate),
     )
+
+
+def _what_no_view_shows(estimate: Estimate) -> tuple[str, ...]:
+    """Say what the stated accuracy can only believe, and what would cure it."""
+    beside = estimate.mounting is Mounting.EYE_TO_HAND
+    if estimate.model is ModelName.PAPER or estimate.arm is not None or not beside:
+        return ()
+    return (WHAT_NO_VIEW_SHOWS,)
 
 
 def view_rmse_px(measurements: Measurements, estimate: Estimate) -> FloatArray:
