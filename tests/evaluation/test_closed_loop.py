@@ -38,9 +38,9 @@ def test_the_session_kept_is_the_run_shown(shown: ClosedLoop) -> None:
     assert 1e3 * np.linalg.norm(off[:3]) == pytest.approx(shown.shown.translation_mm[-1])
     # Every promise is about the error beside it, in the same unit.
     assert 0.01 < shown.shown.translation_mm[-1] / shown.shown.within_mm[-1] < 2
-    # The cameras look down at a board that lies before them.
+    # The cameras look down at a board that lies before them; its origin is a corner, nearer than its middle may be.
     for pose in camera_poses(shown.shown):
-        assert (shown.shown.Y.translation - pose.translation) @ pose.rotation[:, 2] > 0.2
+        assert (shown.shown.Y.translation - pose.translation) @ pose.rotation[:, 2] > 0.1
 
 
 def test_the_sentence_names_the_policies_by_their_numbers(shown: ClosedLoop) -> None:
