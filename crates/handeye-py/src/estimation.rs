@@ -304,20 +304,6 @@ impl Posterior {
         self.inner.nodes.iter().map(|node| node.levels.clone()).collect()
     }
 
-    /// Share of each node (N,).
-    #[getter]
-    fn weights(&self) -> Vec<f64> {
-        self.inner.nodes.iter().map(|node| node.weight).collect()
-    }
-
-    /// Covariance (n, n) at one node.
-    fn node_covariance<'py>(&self, py: Python<'py>, node: usize) -> PyResult<Floats<'py>> {
-        match self.inner.nodes.get(node) {
-            Some(node) => Ok(convert::dynamic_out(py, &node.covariance)),
-            None => Err(invalid(py, &format!("node {node} of {}", self.inner.nodes.len()))),
-        }
-    }
-
     /// Degrees of freedom of the covariance of each `X`.
     #[getter]
     fn degrees_of_freedom(&self) -> Vec<f64> {
