@@ -14,11 +14,11 @@ from handeye.studies.comparison import (
     SetResult,
     compare,
     pooled,
-    summary,
 )
 from handeye.studies.protocol import Protocol, Trial
 from handeye.types import Pose, Recording, View
 from handeye.types.calibration import ModelName
+from handeye.validation.metrics import summary
 
 PAPER = Comparison(Protocol(trials=7, added_views=2, held_out_share=1 / 3), ModelName.PAPER)
 

@@ -1,7 +1,7 @@
 """Timing methods against each other: in turns, so that a busy machine is busy for all of them.
 
 What is measured is the time that the processor spent on this process, with all its threads: on a machine with
-other work the clock on the wall also counts the waiting, most of all for whoever takes long.
+other work the clock on the wall also counts the waiting, most of all for the slow.
 """
 
 import time

@@ -50,7 +50,9 @@ def bench(
         Folder for the table (results.md) and the JSON object (results.json); made if it does not exist.
     """
     if find_spec("handeye.benchmarks") is None:
-        raise UsageError("the benchmarks come with the source of handeye, not with the wheel; run it from a clone")
+        raise UsageError(
+            "the benchmarks come with the source of handeye, not with the wheel; run it from a clone"
+        )
     # Libraries count the cores when they are loaded: they must find one.
     from handeye.benchmarks.machine import one_core  # noqa: PLC0415
 

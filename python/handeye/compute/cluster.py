@@ -122,7 +122,7 @@ def _run(
 
 
 def at_worker(work: Callable[[T], R], piece: T, program: str) -> R:
-    """Do a piece at a worker, if it runs the same program as whoever asks.
+    """Do a piece at a worker, if it runs the same program as the caller.
 
     Raises
     ------

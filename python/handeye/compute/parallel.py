@@ -25,7 +25,7 @@ class Executor(Protocol):
 
 
 Workers = int | Executor
-"""A number of processes of this machine (1: this one), or whoever else does the work."""
+"""A number of processes of this machine (1: this one), or another executor, such as a cluster."""
 
 
 def run_all(
@@ -47,7 +47,7 @@ def run_all(
     pieces
         What to call it with; enough pieces of equal size keep all processes busy.
     workers
-        Number of processes, or whoever else does the work.
+        Number of processes, or another executor.
     progress
         Told how many pieces are done, of how many; first with none done.
 
@@ -114,7 +114,7 @@ def _left_without_a_word(results: Generator[R]) -> Generator[None]:
 
 
 def _nothing(done: int, total: int) -> None:
-    """Be the progress of whoever wants none."""
+    """Report nothing."""
 
 
 def part_of(progress: Progress | None, before: int, total: int) -> Progress | None:

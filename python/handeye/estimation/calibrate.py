@@ -1,4 +1,4 @@
-"""From a recording to a calibration: the one entry for whoever has views already."""
+"""From a recording to a calibration: the one entry where the views are taken already."""
 
 from dataclasses import replace
 

@@ -24,7 +24,7 @@ CACHE_VARIABLE = "HANDEYE_CACHE"
 PUBLISHED = "rwhe-calib"
 SIMULATED_SETS = ("CS_synthetic_1", "CS_synthetic_2", "CS_synthetic_3")
 REAL_SETS = ("kuka_1", "kuka_2")
-# What decides what is read from a folder: a change in one of these makes everything anew.
+# What decides what is read from a folder: after a change in one of these all is read again.
 _READERS = ("datasets", "detection", "importing")
 
 

@@ -93,7 +93,7 @@ def study_injected(
     workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Injected:
-    """Run the protocol of table I with noise added to the robot's poses, drawn anew for each trial.
+    """Run the protocol of table I with noise added to the robot's poses, drawn again for each trial.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from handeye.types import Pose, Recording
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.pose import inverses
 
-# What is held out may leave no start behind: then it is drawn anew.
+# What is held out may leave no start behind: then it is drawn again.
 MOST_SPLITS, MOST_STARTS = 20, 300
 
 

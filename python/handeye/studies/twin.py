@@ -126,7 +126,7 @@ def study_twin(
     pieces_per_set = -(-trials // TRIALS_PER_PIECE)
     total = sets * (1 + len(models) * pieces_per_set)
     make = partial(twin_set, options=options, seed=seed)
-    # A checkpoint keeps what is measured; sets are drawn anew, they are the same.
+    # A checkpoint keeps what is measured; sets are drawn again, they are the same.
     makers = workers.workers if isinstance(workers, Checkpoint) else workers
     made = run_all(make, range(sets), workers=makers, progress=part_of(progress, 0, total))
     found: dict[str, Curves] = {}

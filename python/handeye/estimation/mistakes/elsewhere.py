@@ -135,7 +135,7 @@ def look_elsewhere(
         )
         left = count - len(images)
         penalty = math.lgamma(count + 1) - left * _typical_mistake(first)
-        # Where the others are enough to tell the rest by, these can be paired anew and used.
+        # Where the others are enough to tell the rest by, these can be paired again and used.
         if moved and (len(moved) > count // 2 or not first.is_bearable):
             consider(explanation.log_evidence - penalty, explanation, error)
     if best is not None:

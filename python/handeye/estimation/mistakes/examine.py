@@ -176,7 +176,7 @@ class _Sorting:
     def _say_flipped(self, relabeling: Relabeling, flipped: list[int]) -> None:
         names = [self._names[k] for k in flipped]
         for name in names:
-            self._notes[name] = f"labels {relabeling.words}, read anew"
+            self._notes[name] = f"labels {relabeling.words}, read again"
         self._findings.append(flipped_finding(names, relabeling.words, relabeling.looks_the_same))
 
 

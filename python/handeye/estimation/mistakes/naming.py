@@ -148,7 +148,7 @@ def _share(moved: FloatArray, way: FloatArray) -> float | None:
 
 
 def flipped_finding(names: list[str], words: str, looks_the_same: bool) -> Finding:
-    """Name views whose labels were read anew."""
+    """Name views whose labels were read again."""
     reason = (
         "as the board looks the same after it"
         if looks_the_same
@@ -158,7 +158,7 @@ def flipped_finding(names: list[str], words: str, looks_the_same: bool) -> Findi
     return Finding(
         "view_flipped",
         f"{listed(names)}: the points of the board are labelled {words} against the other views, {reason}; "
-        f"{they} labelled anew and used",
+        f"{they} labelled again and used",
         {"views": names, "labels": words, "looks_the_same": looks_the_same},
     )
 
@@ -179,7 +179,7 @@ def shuffled_words(names: Sequence[str], pairs: Sequence[tuple[int, int]]) -> st
 
 def shuffled_finding(names: Sequence[str], pairs: Sequence[tuple[int, int]], *, applied: bool) -> Finding:
     """Name images that were filed with the wrong poses."""
-    done = "they were paired anew and used" if applied else "what could not be paired anew was left out"
+    done = "they were paired again and used" if applied else "what could not be paired again was left out"
     return Finding(
         "view_shuffled",
         f"{shuffled_words(names, pairs)}; {done}",

@@ -2,7 +2,7 @@
 
 The robot's motion `A_k`, the pose `C_k` of the target in the image with its covariance from the pixels, and
 how that pose depends on the camera's parameters. A hypothesis changes the arrays: it turns labels, pairs
-anew, scales.
+again, scales.
 """
 
 from dataclasses import dataclass, replace
