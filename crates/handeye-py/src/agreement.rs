@@ -14,10 +14,19 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 }
 
 type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
-/// Logarithm of the evidence, levels by name, X and Y, and of every view: deviations, covariances, logarithms of the
+/// Logarithm of the evidence, levels by name, constants, X and Y, and of every view: deviations, covariances, logarithms of the
 /// densities, and probabilities.
-type Fitted<'py> =
-    (f64, Vec<(&'static str, f64)>, Floats<'py>, Floats<'py>, Floats<'py>, Floats<'py>, Vec<f64>, Vec<f64>);
+type Fitted<'py> = (
+    f64,
+    Vec<(&'static str, f64)>,
+    Vec<f64>,
+    Floats<'py>,
+    Floats<'py>,
+    Floats<'py>,
+    Floats<'py>,
+    Vec<f64>,
+    Vec<f64>,
+);
 
 /// Views of one target through one camera, linearised at X and Y.
 #[pyclass(frozen, module = "handeye._core")]
@@ -85,14 +94,23 @@ impl Agreement {
     }
 
     /// Fits a set of views and predicts all; see the type stub.
-    fn fit<'py>(&self, py: Python<'py>, members: Indices, pairs: usize) -> PyResult<Fitted<'py>> {
-        let fit = py.detach(|| self.inner.fit(&members.0, pairs)).map_err(|e| to_python(py, e))?;
+    fn fit<'py>(
+        &self,
+        py: Python<'py>,
+        members: Indices,
+        levels: Option<Vec<f64>>,
+        pairs: usize,
+    ) -> PyResult<Fitted<'py>> {
+        let fit = py
+            .detach(|| self.inner.fit(&members.0, levels.as_deref(), pairs))
+            .map_err(|e| to_python(py, e))?;
         let count = fit.predictions.len();
         let deviations = fit.predictions.iter().flat_map(|p| p.deviation.iter().copied()).collect();
         let covariances = fit.predictions.iter().flat_map(|p| p.covariance.iter().copied()).collect();
         Ok((
             fit.log_evidence,
             fit.levels,
+            fit.constants,
             convert::matrix_out(py, &fit.x[0].to_matrix()),
             convert::matrix_out(py, &fit.y[0].to_matrix()),
             convert::array(py, &[count, 6], deviations),

@@ -122,6 +122,18 @@ impl PoseMeasurements {
         convert::matrices_out(py, &self.views.iter().map(|v| v.covariance).collect::<Vec<_>>())
     }
 
+    /// What all views say of the camera that their poses do not absorb, at 1 px: information and gradient.
+    fn camera_normal<'py>(&self, py: Python<'py>) -> PyResult<(Floats<'py>, Floats<'py>)> {
+        let Some(first) = self.views.first() else { return Err(invalid(py, "no views")) };
+        let mut information = first.camera_information.clone();
+        let mut gradient = first.camera_gradient.clone();
+        for view in &self.views[1..] {
+            information += &view.camera_information;
+            gradient += &view.camera_gradient;
+        }
+        Ok((convert::dynamic_out(py, &information), convert::scalars_out(py, gradient.as_slice().to_vec())))
+    }
+
     /// Factor on the pixel variances for errors that neighbouring points share; one where there are none.
     fn shared_error(&self, variances_px2: Vec<f64>) -> f64 {
         let views: Vec<_> = self.views.iter().map(|v| v.slow).zip(variances_px2).collect();

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
 from handeye.estimation.confidence import Within
-from handeye.estimation.mistakes import examine
+from handeye.estimation.faults import examine
 from handeye.session.attempt import Cell
 from handeye.session.contract import check_at_rest
 from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step

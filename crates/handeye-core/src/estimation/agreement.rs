@@ -3,7 +3,7 @@
 //! Everything that the robot does wrong is taken as new at every station (the working model of the estimate): then the
 //! density of what was measured at a station, given others, is that of a regression with its levels averaged over. A
 //! station that took part is taken out of the answer again in closed form (Cook and Weisberg 1982, section 2.2), and
-//! nodes are weighed anew without it.
+//! nodes are weighed again without it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -21,6 +21,11 @@ use crate::se3::Se3;
 const FARTHEST: f64 = 1400.0;
 /// Curvature that is believed of a level at least, as where it is averaged over.
 const LEAST_CURVATURE: f64 = 0.25;
+
+/// Of so few members each is predicted from the others fitted again; of more it is taken out of the answer.
+const FEW: usize = 5;
+/// A covariance that grows by more when a member is taken out is rounding.
+const MOST_GROWTH: f64 = 1e6;
 
 /// Stations linearised at a guess of the poses.
 pub struct Agreement {
@@ -40,6 +45,8 @@ pub struct SetFit {
     pub x: Vec<Se3>,
     /// `Y` of each target.
     pub y: Vec<Se3>,
+    /// Parameters beside the poses: of the cameras, then the scales of the boards, relative to what was given.
+    pub constants: Vec<f64>,
     /// Expected of each station.
     pub predictions: Vec<Prediction>,
 }
@@ -82,16 +89,24 @@ impl Agreement {
         self.mixed.stations()
     }
 
-    /// Fits the levels to a set of stations and predicts all of them, averaged over `pairs` pairs of nodes and the mode.
+    /// Fits the levels to a set of stations, from `levels` on where these are given, and predicts all of them, averaged
+    /// over `pairs` pairs of nodes and the mode.
     ///
     /// # Errors
     /// [`Error::InvalidInput`] for a station that is not there, [`Error::Numerical`] where the model is singular.
-    pub fn fit(&self, members: &[usize], pairs: usize) -> Result<SetFit, Error> {
+    pub fn fit(&self, members: &[usize], levels: Option<&[f64]>, pairs: usize) -> Result<SetFit, Error> {
         if let Some(k) = members.iter().find(|k| **k >= self.stations()) {
             return Err(Error::invalid(format!("station {k} of {}", self.stations())));
         }
         let set = self.mixed.among(members);
-        let mode = find_mode(&set, set.start())?;
+        let start = match levels {
+            Some(levels) if levels.len() == set.levels.len() => {
+                DVector::from_iterator(levels.len(), levels.iter().map(|l| l.ln()))
+            }
+            Some(levels) => return Err(Error::invalid(format!("{} levels", levels.len()))),
+            None => set.start(),
+        };
+        let mode = find_mode(&set, start)?;
         let mut nodes = Vec::with_capacity(2 * pairs + 1);
         for (t, density) in nodes::around(&mode.t, &mode.curvature, pairs) {
             // Levels at which the model is singular have no share.
@@ -111,32 +126,36 @@ impl Agreement {
         let curvature = (&mode.curvature + mode.curvature.transpose()) * 0.5;
         let spread: f64 = curvature.symmetric_eigenvalues().iter().map(|e| e.max(LEAST_CURVATURE).ln()).sum();
         let rows = set.rows() as f64;
+        let poses = 6 * (self.guess.x.len() + self.guess.y.len());
         let moved = self.guess.moved(theta.as_slice());
         let predictions = (0..self.stations())
-            .map(|k| self.predict(k, members.contains(&k), &nodes).ok_or_else(singular))
+            .map(|k| self.predict(k, members, &nodes).ok_or_else(singular))
             .collect::<Result<_, _>>()?;
         Ok(SetFit {
             log_evidence: -mode.value - 0.5 * spread - 0.5 * rows * std::f64::consts::TAU.ln(),
             levels: set.levels.iter().zip(mode.t.iter()).map(|(level, t)| (level.name, t.exp())).collect(),
+            constants: theta.as_slice()[poses..].to_vec(),
             x: moved.x,
             y: moved.y,
             predictions,
         })
     }
 
-    fn predict(&self, k: usize, inside: bool, nodes: &[Node]) -> Option<Prediction> {
+    fn predict(&self, k: usize, members: &[usize], nodes: &[Node]) -> Option<Prediction> {
+        let inside = members.contains(&k);
+        let others = || self.mixed.among(&members.iter().copied().filter(|m| *m != k).collect::<Vec<_>>());
+        let without = (inside && members.len() <= FEW).then(others);
         let mut each = Vec::with_capacity(nodes.len());
         for node in nodes {
-            let (noise, mut mean, spread) = self.mixed.residual(k, &node.t, (&node.theta, &node.covariance));
-            let mut covariance = if inside {
-                // The set has seen it: what is left of its noise is (I - H) V.
-                let taken_out = &noise * (&noise - &spread).try_inverse()?;
-                mean = &taken_out * mean;
-                taken_out * noise
-            } else {
-                noise + spread
+            let expected = match &without {
+                Some(set) => self.expected_of_others(k, set, node),
+                None if inside => {
+                    self.taken_out(k, node).or_else(|| self.expected_of_others(k, &others(), node))
+                }
+                None => Some(self.expected(k, &node.t, (&node.theta, &node.covariance))),
             };
-            covariance = (&covariance + covariance.transpose()) * 0.5;
+            let (mean, covariance) = expected?;
+            let covariance = (&covariance + covariance.transpose()) * 0.5;
             let factor = covariance.clone().cholesky()?;
             let distance = mean.dot(&factor.solve(&mean));
             let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
@@ -160,6 +179,38 @@ impl Agreement {
             prediction.p_value += share * beyond(*distance, size);
         }
         Some(prediction)
+    }
+
+    /// Mean and covariance of the twists of a station that took no part.
+    fn expected(
+        &self,
+        k: usize,
+        t: &DVector<f64>,
+        answer: (&DVector<f64>, &DMatrix<f64>),
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let (noise, mean, spread) = self.mixed.residual(k, t, answer);
+        (mean, noise + spread)
+    }
+
+    /// The same of a member, from the others fitted again at the same levels.
+    fn expected_of_others(
+        &self,
+        k: usize,
+        others: &Mixed,
+        node: &Node,
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let at = others.evaluate(&node.t, Wanted::Answer)?;
+        Some(self.expected(k, &node.t, (&at.theta, &at.covariance)))
+    }
+
+    /// The same of a member, taken out of the answer: what is left of its noise is (I - H) V. `None` where the others
+    /// hardly determine the answer, as the difference is then all rounding.
+    fn taken_out(&self, k: usize, node: &Node) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let (noise, mean, spread) = self.mixed.residual(k, &node.t, (&node.theta, &node.covariance));
+        let remaining = (&noise - &spread).cholesky()?;
+        let taken_out = remaining.solve(&noise).transpose();
+        let covariance = &taken_out * &noise;
+        (covariance.trace() < MOST_GROWTH * noise.trace()).then(|| (&taken_out * mean, covariance))
     }
 }
 

@@ -17,7 +17,7 @@ use super::cell::Cell;
 use super::component::{Component, per_station};
 use crate::error::Error;
 
-/// Components of a cell whose robot errs anew at every station.
+/// Components of a cell whose robot errs in a new way at every station.
 pub(super) fn independent(cell: &Cell) -> Vec<Box<dyn Component>> {
     let mut all = of_pictures(cell);
     all.push(Box::new(robot_pose::RobotPose::flange()));
