@@ -78,8 +78,8 @@ def test_it_runs_a_calibration(installed: Path, tmp_path: Path) -> None:
     command += ["-1100", "-1100", "20", "1100", "1100", "1300"]
     answer = json.loads(ran(installed, *command))
     assert answer["end"] == "accuracy_reached"
-    found = Pose(answer["calibration"]["X"])
+    T_flange_camera = Pose(answer["calibration"]["T_flange_camera"])
     assert cell.truth.X is not None
-    off = (found @ cell.truth.X.inverse()).log()
+    off = (cell.truth.X @ T_flange_camera).log()
     assert np.linalg.norm(off[:3]) < 0.5e-3
     assert np.rad2deg(np.linalg.norm(off[3:])) < 0.05

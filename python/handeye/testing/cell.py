@@ -9,12 +9,12 @@ from handeye.cameras.protocol import Frame, Grey
 from handeye.cameras.simulated import Optics
 from handeye.datasets.toml_text import toml_text
 from handeye.errors import DeviceError
+from handeye.estimation import Measurements, paper_estimate
 from handeye.planning.stopping import State
 from handeye.robots import Arm, open_arm
 from handeye.robots.protocol import Goal
 from handeye.robots.simulated import ArmErrors
 from handeye.session.simulated import SimulationOptions, simulated_cell, usual_errors
-from handeye.solving import Measurements, paper_estimate
 from handeye.types import Mounting, Pose, View
 
 
@@ -85,7 +85,7 @@ class MockCell:
         goal = Goal(f"motion_{self._motions}.1", Pose(self.arm.forward(joints_rad)), joints_rad)
         self._hidden.move_to(goal)
 
-    def frame(self, label: str) -> Frame:
+    def grab(self, label: str) -> Frame:
         """Return what the camera sees from where the arm truly stands."""
         return self._source.grab(label)
 
@@ -97,7 +97,7 @@ class MockCell:
         DeviceError
             The camera of this cell gives points only.
         """
-        image = self.frame(label).image
+        image = self.grab(label).image
         if image is None:
             raise DeviceError("this camera gives points only", code="no_image")
         return image
@@ -139,7 +139,7 @@ class MockCell:
             joints = np.array(self.start_rad) + random.uniform(-0.15, 0.15, len(self.arm))
             self.stand(tuple(joints.tolist()))
             name = f"view_{len(taken) + 1:02d}"
-            points = self.frame(f"{name}.1").points
+            points = self.grab(f"{name}.1").points
             if points is None:
                 raise DeviceError("this camera gives pictures only", code="no_points")
             if len(points.point_ids) == self.target.point_count:
