@@ -232,8 +232,8 @@ def solve_rig(
     Raises
     ------
     InputError, DegenerateError, SolveError
-        As for `handeye.estimation.solve`; the message names the camera. Also where nothing ties a camera to the
-        arm.
+        As for `handeye.estimation.solve`; the message names the camera. Also where nothing ties a camera to
+        the arm.
 
     Examples
     --------
@@ -310,8 +310,8 @@ def check_tied(measurements: RigMeasurements) -> None:
             raise InputError(
                 f"camera {camera}: nothing ties it to the arm or to another camera",
                 code="not_tied",
-                hint=f"let it see a target on the {other.value} at {FEWEST_STATIONS} stations or more, or one "
-                "that another camera sees too",
+                hint=f"let it see a target on the {other.value} at {FEWEST_STATIONS} stations or more, or "
+                "one that another camera sees too",
             )
     for target in measurements.targets:
         if ("target", target) not in known:

@@ -40,7 +40,7 @@ def undetermined_rig(fit: CellFit, noise: Noise) -> dict[str, tuple[Unobservable
 
 
 def _null_space(fit: CellFit, noise: Noise) -> FloatArray:
-    """(n, D) directions of all X and Y that are open by the motions of the robot, or by those of the images."""
+    """(n, D) directions of all X and Y that are open by the robot's motions, or by those of the images."""
     measurements = fit.measurements
     count = 6 * (len(measurements.cameras) + len(measurements.targets))
     null = np.zeros((count, 0))

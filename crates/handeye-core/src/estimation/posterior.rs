@@ -341,7 +341,9 @@ fn degrees_of_freedom(nodes: &[Node], block: impl Fn(&DMatrix<f64>) -> Matrix6<f
         .iter()
         .map(|node| {
             // In standard deviations, as metres and radians differ by orders.
-            block(&node.covariance).cholesky().map_or(f64::NAN, |f| f.l_dirty().diagonal().map(f64::ln).sum() / 3.0)
+            block(&node.covariance)
+                .cholesky()
+                .map_or(f64::NAN, |f| f.l_dirty().diagonal().map(f64::ln).sum() / 3.0)
         })
         .collect();
     let usable = || nodes.iter().zip(&sizes).filter(|(_, s)| s.is_finite());
