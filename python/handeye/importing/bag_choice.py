@@ -46,6 +46,9 @@ class BagOptions:
     flange_frame: str | None = None
 
 
+NOTHING_CHOSEN = BagOptions()
+
+
 @dataclass(frozen=True, eq=False)
 class Chosen:
     """What counts in a bag.
@@ -251,8 +254,9 @@ def _of_frames(contents: Contents, options: BagOptions) -> _Source:
             [name for name in _ancestors(flange, above) if not _moves(name, above, moving)], BASE_NAMES
         )
     if flange is None or base is None:
+        named = ", ".join(known[:30])
         raise InputError(
-            f"{contents.path}: which frames of tf are the robot's base and flange? There are {', '.join(known[:30])}",
+            f"{contents.path}: which frames of tf are the robot's base and flange? There are {named}",
             code="unknown_frame",
             hint="name them with --base-frame and --flange-frame",
         )

@@ -1,4 +1,4 @@
-"""From a bag to a recording: pictures of where the arm stood still, and the lag between pictures and poses."""
+"""From a bag to a recording: pictures of where the arm stood still, and their lag behind the poses."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,10 +10,10 @@ from handeye.datasets import ImageSet, Shot
 from handeye.datasets.bags import Contents, Station, Track, fetch_pictures, grey_of, stations
 from handeye.detection import Detection, Image, detect_all
 from handeye.errors import HandeyeError, InputError
+from handeye.estimation import solve
 from handeye.importing.bag_choice import BagOptions, Chosen, choose
 from handeye.importing.lag import Lag, estimate_lag
 from handeye.robots import Arm
-from handeye.solving import solve
 from handeye.types import Mounting, Pose, Recording, Target
 from handeye.types.arrays import FloatArray
 
@@ -103,7 +103,8 @@ class BagPictures:
                 picked.setdefault(near, station)
         if not picked:
             raise InputError(
-                f"{self.contents.path}: the arm stood still {len(self._stood)} times, never while a picture was taken",
+                f"{self.contents.path}: the arm stood still {len(self._stood)} times, never while a picture "
+                "was taken",
                 code="no_stations",
                 hint="let the arm stand for half a second before it moves on; docs/commands/import.md",
             )

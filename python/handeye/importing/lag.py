@@ -2,8 +2,8 @@
 
 With hand-eye and target known from where the arm stood still, a picture that is stamped t shows the target
 from where the flange was at t - lag. Where the chain then puts the points, and where they were found, differ
-by the lag times how fast the points move through the picture (Furgale, Rehder and Siegwart, IROS 2013, estimate
-it with the trajectory; here the trajectory is what the robot says).
+by the lag times how fast the points move through the picture (Furgale, Rehder and Siegwart, IROS 2013,
+estimate it with the trajectory; here the trajectory is what the robot says).
 """
 
 from collections.abc import Mapping, Sequence

@@ -24,12 +24,12 @@ from handeye.datasets.pose_list import stated_target
 from handeye.datasets.pose_rows import NOTHING_STATED
 from handeye.detection import Detection, Image, Reason, calibrate_camera, detect_all
 from handeye.errors import DetectionError, HandeyeError, InputError
-from handeye.importing.bag_choice import BagOptions
+from handeye.estimation import Measurements
+from handeye.importing.bag_choice import NOTHING_CHOSEN, BagOptions
 from handeye.importing.bags import Timing, pictures_of, shifted
 from handeye.importing.readings import compare
 from handeye.importing.unstated import unstated
 from handeye.robots import Arm
-from handeye.solving import Measurements
 from handeye.types import Camera, Mounting, Recording, Target
 
 # So many images from the first on, all with a board of another size: the size was given wrongly, and looking
@@ -81,7 +81,7 @@ class SourceOptions:
     camera: Camera | None = None
     poses: str | None = None
     stated: Statement = NOTHING_STATED
-    bag: BagOptions = BagOptions()
+    bag: BagOptions = NOTHING_CHOSEN
     arm: Arm | None = None
 
 

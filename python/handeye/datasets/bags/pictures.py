@@ -1,4 +1,4 @@
-"""Grey values of the pictures in messages (sensor_msgs, `image_encodings.hpp`; compressed_image_transport)."""
+"""Grey values of pictures in messages (`image_encodings.hpp` of sensor_msgs, compressed_image_transport)."""
 
 import cv2
 import numpy as np
@@ -45,8 +45,9 @@ def _plain(picture: Raw, where: str) -> Grey:
     encoding = picture.encoding.strip().lower()
     channels, code = _COLOURS.get(encoding, (1, None))
     if code is None and encoding not in _GREY | _DEEP:
+        known = ", ".join(sorted(_GREY | _DEEP | set(_COLOURS)))
         raise InputError(
-            f"{where}: pictures in {picture.encoding[:40]!r}, expected {', '.join(sorted(_GREY | _DEEP | set(_COLOURS)))}",
+            f"{where}: pictures in {picture.encoding[:40]!r}, expected {known}",
             code="not_an_image",
             hint="name the topic of the camera with --image-topic",
         )

@@ -34,7 +34,7 @@ class Sqlite3:
                     return
                 marks = ",".join("?" * len(wanted))
                 found = database.execute(
-                    f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) ORDER BY id",
+                    f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) ORDER BY id",  # noqa: S608
                     tuple(wanted),
                 )
                 for key, received_ns, data in found:
@@ -46,7 +46,7 @@ class Sqlite3:
             raise InputError(
                 f"{self._path}: no database that can be read: {str(error)[:100]}",
                 code="damaged_bag",
-                hint="copy the whole bag, with metadata.yaml; `ros2 bag reindex` repairs one that was not closed",
+                hint="copy the whole bag; `ros2 bag reindex` repairs one that was not closed",
             ) from error
 
     def _opened(self) -> sqlite3.Connection:

@@ -1,6 +1,6 @@
 """Unpacking what a bag has compressed, never more than it may be.
 
-bz2 comes with Python. lz4 and zstd are asked for when a bag needs them; `pip install 'handeye[bags]'` has both.
+bz2 comes with Python; lz4 and zstd are asked for when a bag needs them (`pip install 'handeye[bags]'`).
 """
 
 import bz2
