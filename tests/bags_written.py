@@ -1,16 +1,17 @@
 """Bags of a made-up cell that moves between stations, written by the library rosbags (Ternaris, Apache-2.0)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import cv2
 import numpy as np
 
 from cells import Cell
 from handeye.cameras.render import Appearance, BoardRenderer
+from handeye.errors import SolveError
 from handeye.robots import Arm
 from handeye.types import Camera, Chessboard, Mounting, Pose, Target
 
@@ -47,7 +48,9 @@ class Journey:
 
     def _stops(self) -> tuple[list[Pose], list[np.ndarray]]:
         if self.arm is None:
-            return [self.cell.robot_pose(self.cell.look(tilt_rad=0.5, roll_rad=1.0)) for _ in range(self.stations)], []
+            return [
+                self.cell.robot_pose(self.cell.look(tilt_rad=0.5, roll_rad=1.0)) for _ in range(self.stations)
+            ], []
         # Where the arm reaches: a posture of its own, and the board put in front of it.
         middle = np.array([0.0, -1.2, 1.4, -1.6, -1.5, 0.2])[: len(self.arm)]
         postures: list[np.ndarray] = []
@@ -58,7 +61,7 @@ class Journey:
             goal = self.cell.robot_pose(self.cell.look(tilt_rad=0.5, roll_rad=1.0))
             try:
                 postures.append(self.arm.inverse(goal, middle))
-            except Exception:
+            except SolveError:
                 continue
         return [Pose(self.arm.forward(q)) for q in postures], postures
 
@@ -93,7 +96,9 @@ class Journey:
         for taken in np.arange(0.05, self.duration_s, 1 / self.picture_hz):
             pose = self.pose(float(taken))
             A = pose.inverse() if self.mounting is Mounting.EYE_IN_HAND else pose
-            out.append((float(taken) + self.lag_s, renderer.image(self.cell.X @ A @ self.cell.Y, self.random)))
+            out.append(
+                (float(taken) + self.lag_s, renderer.image(self.cell.X @ A @ self.cell.Y, self.random))
+            )
         return out
 
     @property
@@ -118,15 +123,27 @@ def write(
         info = sink.camera_info(journey.camera)
         sink.say("/camera/camera_info", "sensor_msgs/msg/CameraInfo", 0.0, info)
         if description:
-            sink.say("/robot_description", "std_msgs/msg/String", 0.0, sink.make("std_msgs/msg/String", data=description))
+            sink.say(
+                "/robot_description",
+                "std_msgs/msg/String",
+                0.0,
+                sink.make("std_msgs/msg/String", data=description),
+            )
         if poses == "tf":
             static = [sink.transform(0.0, "world", "base_link", Pose.exp([0.1, 0.2, 0.3, 0, 0, 0.4]))]
-            sink.say("/tf_static", "tf2_msgs/msg/TFMessage", 0.0, sink.make("tf2_msgs/msg/TFMessage", transforms=static))
+            sink.say(
+                "/tf_static",
+                "tf2_msgs/msg/TFMessage",
+                0.0,
+                sink.make("tf2_msgs/msg/TFMessage", transforms=static),
+            )
         events: list[tuple[float, Callable[[], None]]] = []
-        for time in np.arange(-0.2, journey.duration_s + 0.2, 1 / journey.pose_hz):
-            events.append((float(time), lambda t=float(time): _pose(sink, journey, t, poses)))
-        for time, grey in journey.pictures:
-            events.append((time + 0.004, lambda t=time, g=grey: _picture(sink, t, g, picture, stamps=stamps)))
+        times = np.arange(-0.2, journey.duration_s + 0.2, 1 / journey.pose_hz).tolist()
+        events += [(time, partial(_pose, sink, journey, time, poses)) for time in times]
+        events += [
+            (time + 0.004, partial(_picture, sink, time, grey, picture, stamps=stamps))
+            for time, grey in journey.pictures
+        ]
         for _, event in sorted(events, key=lambda e: e[0]):
             event()
     return sink.path
@@ -157,7 +174,9 @@ def _pose(sink: "Sink", journey: Journey, time: float, how: str) -> None:
         ]
         sink.say("/tf", "tf2_msgs/msg/TFMessage", time, sink.make("tf2_msgs/msg/TFMessage", transforms=both))
         return
-    message = sink.make("geometry_msgs/msg/PoseStamped", header=sink.header(time, "base"), pose=sink.pose(pose))
+    message = sink.make(
+        "geometry_msgs/msg/PoseStamped", header=sink.header(time, "base"), pose=sink.pose(pose)
+    )
     sink.say("/tcp_pose", "geometry_msgs/msg/PoseStamped", time, message)
 
 
@@ -212,15 +231,21 @@ class Sink:
                 form = self.writer.CompressionFormat
                 self.writer.set_compression(form.BZ2 if kind.endswith("bz2") else form.LZ4)
         else:
-            plugin = rosbag2.StoragePlugin.SQLITE3 if kind.startswith("sqlite3") else rosbag2.StoragePlugin.MCAP
+            plugin = (
+                rosbag2.StoragePlugin.SQLITE3 if kind.startswith("sqlite3") else rosbag2.StoragePlugin.MCAP
+            )
             self.writer = rosbag2.Writer(self.path, version=9, storage_plugin=plugin)
             if "-" in kind:
-                mode = rosbag2.CompressionMode.MESSAGE if kind.endswith("message") else rosbag2.CompressionMode.STORAGE
+                mode = (
+                    rosbag2.CompressionMode.MESSAGE
+                    if kind.endswith("message")
+                    else rosbag2.CompressionMode.STORAGE
+                )
                 self.writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
         self.connections: dict[str, Any] = {}
         self.sequence = 0
 
-    def __enter__(self) -> "Sink":
+    def __enter__(self) -> Self:
         self.writer.open()
         return self
 
@@ -264,7 +289,9 @@ class Sink:
         p = np.array([fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1.0, 0])
         names = "DKRP" if self.is_ros1 else "dkrp"
         values = dict(zip(names, (np.array(distortion), k, np.eye(3).ravel(), p), strict=True))
-        roi = self.make("sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
+        roi = self.make(
+            "sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
+        )
         return self.make(
             "sensor_msgs/msg/CameraInfo",
             header=self.header(0.0, "camera"),
@@ -282,5 +309,3 @@ class Sink:
             self.connections[topic] = self.writer.add_connection(topic, kind, typestore=self.store)
         serialize = self.store.serialize_ros1 if self.is_ros1 else self.store.serialize_cdr
         self.writer.write(self.connections[topic], START_NS + round(time * 1e9), serialize(message, kind))
-
-

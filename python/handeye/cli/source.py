@@ -14,8 +14,8 @@ from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, rea
 from handeye.datasets.recording_format import FILE_NAME
 from handeye.errors import HandeyeError
 from handeye.importing import BagOptions, Opened, SourceOptions, open_any, open_folder
-from handeye.robots import Arm
 from handeye.notations import Direction, Unit, notation_of
+from handeye.robots import Arm
 from handeye.types import Chessboard, Mounting, Target
 
 

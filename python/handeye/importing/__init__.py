@@ -6,4 +6,15 @@ from handeye.importing.lag import Lag
 from handeye.importing.opening import CameraOrigin, Opened, SourceOptions, open_any, open_folder
 from handeye.importing.poses_alone import PosesSolved, solve_poses
 
-__all__ = ["BagOptions", "CameraOrigin", "Lag", "Opened", "PosesSolved", "SourceOptions", "Timing", "open_any", "open_folder", "solve_poses"]
+__all__ = [
+    "BagOptions",
+    "CameraOrigin",
+    "Lag",
+    "Opened",
+    "PosesSolved",
+    "SourceOptions",
+    "Timing",
+    "open_any",
+    "open_folder",
+    "solve_poses",
+]

@@ -1,13 +1,14 @@
 """From a bag to a recording: pictures of where the arm stood still, and their lag behind the poses."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
 from handeye.datasets import ImageSet, Shot
 from handeye.datasets.bags import Contents, Station, Track, fetch_pictures, grey_of, stations
+from handeye.datasets.bags.messages import Compressed, Raw
 from handeye.detection import Detection, Image, detect_all
 from handeye.errors import HandeyeError, InputError
 from handeye.estimation import solve
@@ -18,7 +19,7 @@ from handeye.types import Mounting, Pose, Recording, Target
 from handeye.types.arrays import FloatArray
 
 LAYOUT = "bag"
-MOST_STATIONS, MOST_MOVING = 200, 40
+MOST_STATIONS, MOST_MOVING = 120, 40
 # On the move are pictures at which the arm is at least this share of its usual speed fast.
 MOVING_SHARE = 0.4
 LEAST_SPEED_M_S = 5e-3
@@ -85,6 +86,7 @@ class BagPictures:
     mounting: Mounting
     lag_s: float = 0.0
     _stood: list[Station] = field(default_factory=list[Station], init=False)
+    _pictures: dict[int, Raw | Compressed] = field(default_factory=dict[int, Raw | Compressed], init=False)
 
     def images(self) -> ImageSet:
         """Return the pictures of where the arm stood still.
@@ -109,7 +111,8 @@ class BagPictures:
                 hint="let the arm stand for half a second before it moves on; docs/commands/import.md",
             )
         places = _some(sorted(picked), MOST_STATIONS)
-        fetched = self._fetched(places)
+        # A bag is long: what is looked at later comes with it, in one reading.
+        self._fetch([*places, *self._moving()])
         shots: list[Shot] = []
         width = max(2, len(str(len(places))))
         for number, place in enumerate(places, start=1):
@@ -128,7 +131,7 @@ class BagPictures:
             camera=self.chosen.camera,
             source=f"bag {path.name}, pictures on {self.chosen.image_topic}",
             warnings=self.chosen.warnings,
-            pictures={shot.name: fetched[place] for shot, place in zip(shots, places, strict=True)},
+            pictures={shot.name: self._read(place) for shot, place in zip(shots, places, strict=True)},
         )
 
     def timing(self, recording: Recording) -> Timing:
@@ -144,6 +147,10 @@ class BagPictures:
             times = {str(place): float(self.chosen.times_s[place]) for place in moving}
             lag = estimate_lag(calibration, self.target, self.chosen.track, times, found)
         return Timing(len(self._stood), lag)
+
+    def shift(self, lag: Lag) -> None:
+        """Let a lag count when the pictures are chosen at which the arm stood still."""
+        self.lag_s = lag.seconds
 
     def misses_stations(self, lag: Lag | None) -> bool:
         """Tell whether a lag puts pictures beside the time at which the arm stood still."""
@@ -166,17 +173,16 @@ class BagPictures:
         )
 
     def _found(self, places: Sequence[int]) -> Mapping[str, Detection]:
-        readers = self._fetched(places)
-        return detect_all([(str(place), readers[place]) for place in places], self.target).found
+        return detect_all([(str(place), self._read(place)) for place in places], self.target).found
 
-    def _fetched(self, places: Sequence[int]) -> dict[int, Callable[[], Image]]:
-        pictures = fetch_pictures(self.contents.path, self.chosen.image_topic, places)
-        return {
-            place: partial(
-                grey_of, picture, f"{self.contents.path}: picture {place} on {self.chosen.image_topic}"
-            )
-            for place, picture in pictures.items()
-        }
+    def _fetch(self, places: Sequence[int]) -> None:
+        missing = set(places) - self._pictures.keys()
+        if missing:
+            self._pictures |= fetch_pictures(self.contents.path, self.chosen.image_topic, missing)
+
+    def _read(self, place: int) -> Callable[[], Image]:
+        where = f"{self.contents.path}: picture {place} on {self.chosen.image_topic}"
+        return partial(grey_of, self._pictures[place], where)
 
 
 def pictures_of(
@@ -193,11 +199,6 @@ def pictures_of(
     if np.any(np.diff(chosen.track.times_s) < 0):
         raise InputError(f"{contents.path}: times that run backwards", code="damaged_bag")
     return BagPictures(contents, chosen, target, mounting)
-
-
-def shifted(pictures: BagPictures, lag: Lag) -> BagPictures:
-    """Return the pictures where a lag counts when those are chosen at which the arm stood still."""
-    return replace(pictures, lag_s=lag.seconds)
 
 
 def _sparse(track: Track) -> list[Station]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from handeye.datasets.bags import Track
 from handeye.detection import Detection
-from handeye.types import Target
+from handeye.types import Pose, Target
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration
 
@@ -113,10 +113,9 @@ def _steps(
 
 def _off(calibration: Calibration, track: Track, seen: _Seen, lag: float) -> FloatArray:
     """Return by how much (2 N,) points are predicted beside where they were found, NaN behind the camera."""
-    pose = track.at(np.array([seen.time_s - lag]))[0]
-    A = pose if calibration.mounting.value == "eye_to_hand" else np.linalg.inv(pose)
-    chain = calibration.X.matrix @ A @ calibration.Y.matrix
-    pixels, visible = calibration.camera.project(seen.points @ chain[:3, :3].T + chain[:3, 3])
+    pose = Pose(track.at(np.array([seen.time_s - lag]))[0])
+    chain = calibration.X @ calibration.mounting.chain(pose) @ calibration.Y
+    pixels, visible = calibration.camera.project(chain.act(seen.points))
     pixels[~visible] = np.nan
     return np.asarray((pixels - seen.pixels).ravel(), dtype=np.float64)
 
@@ -128,5 +127,6 @@ def _rms(calibration: Calibration, track: Track, seen: _Seen, lag: float) -> flo
 
 def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
     order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    return float(values[order][int(np.searchsorted(total, 0.5 * total[-1]))])
+    total: FloatArray = np.cumsum(weights[order])
+    middle = int(np.searchsorted(total, 0.5 * float(total[-1])))
+    return float(values[order][middle])

@@ -26,7 +26,7 @@ from handeye.detection import Detection, Image, Reason, calibrate_camera, detect
 from handeye.errors import DetectionError, HandeyeError, InputError
 from handeye.estimation import Measurements
 from handeye.importing.bag_choice import NOTHING_CHOSEN, BagOptions
-from handeye.importing.bags import Timing, pictures_of, shifted
+from handeye.importing.bags import Timing, pictures_of
 from handeye.importing.readings import compare
 from handeye.importing.unstated import unstated
 from handeye.robots import Arm
@@ -231,7 +231,7 @@ def _of_bag(contents: Contents, options: SourceOptions, progress: Callable[[int,
     opened = _of_images(pictures.images(), options.camera, progress)
     timing = pictures.timing(opened.recording)
     if timing.lag is not None and pictures.misses_stations(timing.lag):
-        pictures = shifted(pictures, timing.lag)
+        pictures.shift(timing.lag)
         opened = _of_images(pictures.images(), options.camera, progress)
         timing = pictures.timing(opened.recording)
     return replace(opened, timing=timing)

@@ -111,7 +111,7 @@ def _listed(path: Path) -> tuple[list[str], bool]:
     where = path / METADATA
     document = read_yaml(where)
     told = cast("Mapping[str, object]", document).get(_INFORMATION) if isinstance(document, Mapping) else None
-    table = cast("Mapping[str, object]", told) if isinstance(told, Mapping) else {}
+    table: Mapping[str, object] = cast("Mapping[str, object]", told) if isinstance(told, Mapping) else {}
     files = table.get("relative_file_paths")
     if not isinstance(files, list) or not files:
         raise InputError(f"{where}: relative_file_paths lists no file", code="invalid_field")

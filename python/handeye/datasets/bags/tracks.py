@@ -66,7 +66,8 @@ class Track:
         """Return how fast (M,) the flange moves at times (M,), in m/s, a radian counting as half a metre."""
         half = 0.02
         twists = _core.se3_log(np.linalg.inv(self.at(times_s - half)) @ self.at(times_s + half)) / (2 * half)
-        return np.hypot(np.linalg.norm(twists[:, :3], axis=1), 0.5 * np.linalg.norm(twists[:, 3:], axis=1))
+        turned = 0.5 * np.linalg.norm(twists[:, 3:], axis=1)
+        return np.asarray(np.hypot(np.linalg.norm(twists[:, :3], axis=1), turned), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class Station:
 def seconds(stamps: Stamps, origin_ns: int, *, received: bool) -> FloatArray:
     """Return times (N,) in seconds since an origin: those of the messages, or of when they were received."""
     values = np.array(stamps.received_ns if received else stamps.made_ns, dtype=np.int64)
-    return (values - origin_ns) * 1e-9
+    return np.asarray((values - origin_ns) * 1e-9, dtype=np.float64)
 
 
 def rising(times_s: FloatArray, poses: FloatArray, words: str, joints: FloatArray | None = None) -> Track:
