@@ -14,8 +14,8 @@ from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
 from handeye.datasets.shipped import shipped_recording
 from handeye.datasets.toml_text import toml_text
-from handeye.evaluation import example_folder
-from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
+from handeye.simulation import example_folder
+from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.types import Charuco, Mounting
 from scenes import scene
 
@@ -186,7 +186,9 @@ def test_twin(handeye: Handeye) -> None:
     compare("handeye study twin", handeye.json("study", "twin", *options))
 
 
-def test_coverage(handeye: Handeye) -> None:
+def test_simulated_studies(handeye: Handeye) -> None:
+    data = handeye.json("study", "methods", "--trials", "1", "--workers", "1")
+    compare("handeye study methods", data)
     data = handeye.json("study", "coverage", "--trials", "1", "--workers", "1")
     compare("handeye study coverage", data)
 

@@ -20,7 +20,7 @@ def methods(*, trials: Trials = Trials(), common: Common = Common()) -> Answer: 
     with the arm taken as exact, and the default. Level 1 is an arm of 0.02 deg and 0.35 mm and pixels of
     0.1 px; level 0 is without noise, where every method must find the truth.
     """
-    from handeye.evaluation.studies.methods import study_methods  # noqa: PLC0415 - help need not wait for it
+    from handeye.studies.methods import study_methods  # noqa: PLC0415 - help need not wait for it
 
     check_folder(trials.output)
     with progress("Calibrating by every method") as advance:
@@ -37,7 +37,7 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
     from rich.table import Table  # noqa: PLC0415
 
     from handeye.cli import study_tables as tables  # noqa: PLC0415
-    from handeye.cli.wording import figures, heading  # noqa: PLC0415
+    from handeye.cli.wording import heading  # noqa: PLC0415
 
     for mounting, rows in document["mountings"].items():
         heading(
@@ -53,13 +53,15 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
         for method, cells in rows.items():
             texts: list[str] = []
             for cell in cells:
-                texts += [_cell(cell, "translation_mm", figures), _cell(cell, "rotation_deg", figures)]
+                texts += [_cell(cell, "translation_mm"), _cell(cell, "rotation_deg")]
             table.add_row(method, *texts)
         console.print(table)
     tables.show_written(console, written)
 
 
-def _cell(cell: dict[str, Any], key: str, figures: Any) -> str:
-    if key not in cell:
+def _cell(cell: dict[str, Any], key: str) -> str:
+    from handeye.cli.wording import figures  # noqa: PLC0415
+
+    if cell[key] is None:
         return "refused"
-    return "0" if cell[key] < 1e-6 else str(figures(cell[key]))
+    return "0" if cell[key] < 1e-6 else figures(cell[key])
