@@ -192,7 +192,9 @@ def test_twin(handeye: Handeye) -> None:
     compare("handeye study twin", handeye.json("study", "twin", *options))
 
 
-def test_coverage(handeye: Handeye) -> None:
+def test_simulated_studies(handeye: Handeye) -> None:
+    data = handeye.json("study", "methods", "--trials", "1", "--workers", "1")
+    compare("handeye study methods", data)
     data = handeye.json("study", "coverage", "--trials", "1", "--workers", "1")
     compare("handeye study coverage", data)
 
