@@ -13,6 +13,7 @@ from handeye.datasets import (
     rwhe_calib,
     visp,
 )
+from handeye.datasets.bags import importer as bags
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Imported, Importer
 from handeye.datasets.pose_rows import NOTHING_STATED, Statement
@@ -31,6 +32,7 @@ IMPORTERS: dict[str, Importer] = {
         easy_handeye2.IMPORTER,
         moveit_samples.IMPORTER,
         visp.IMPORTER,
+        bags.IMPORTER,
         pose_list.IMPORTER,
     )
 }
@@ -62,9 +64,10 @@ def load(
 
     Returns
     -------
-    LoadedRecording, ImageSet, UnreadPoses or PosePairs
+    LoadedRecording, ImageSet, UnreadPoses, PosePairs or Contents
         An `ImageSet` has no points yet: they are still to be detected; of `UnreadPoses` not even the robot's
-        poses are known; `PosePairs` never had pictures.
+        poses are known; `PosePairs` never had pictures; of the `Contents` of a bag it is still to be chosen
+        what counts.
 
     Raises
     ------
