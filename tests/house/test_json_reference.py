@@ -14,8 +14,8 @@ from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
 from handeye.datasets.shipped import shipped_recording
 from handeye.datasets.toml_text import toml_text
-from handeye.evaluation import example_folder
-from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
+from handeye.simulation import example_folder
+from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.types import Charuco, Mounting
 from scenes import scene
 

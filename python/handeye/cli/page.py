@@ -10,11 +10,11 @@ from cyclopts import Parameter, validators
 
 from handeye.datasets.writing import write_file
 from handeye.errors import InputError
+from handeye.estimation import Estimate, Measurements
 from handeye.importing import Opened
 from handeye.robots import Arm
 from handeye.session import End, Session, SessionStore
 from handeye.session.drivers import MANUAL, Person
-from handeye.solving import Estimate, Measurements
 
 if TYPE_CHECKING:
     from handeye.session.configuration import Prepared

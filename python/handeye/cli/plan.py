@@ -20,13 +20,13 @@ from handeye.cli.plan_together import Together, check_together, choose_together,
 from handeye.cli.source import Source, mindful_of
 from handeye.datasets import read_poses
 from handeye.errors import InputError
+from handeye.estimation import Estimate, Measurements, make_estimator
+from handeye.estimation.initialize import check_views
 from handeye.importing import Opened
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
 from handeye.planning.prediction import Sight
 from handeye.robots import ArmKinematics
 from handeye.session.deciding import Considered
-from handeye.solving import Estimate, Measurements, make_estimator
-from handeye.solving.initialize import check_views
 from handeye.types.calibration import MM_PER_M, ModelName
 
 if TYPE_CHECKING:

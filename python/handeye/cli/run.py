@@ -18,6 +18,7 @@ from handeye.cli.run_options import Limits, Simulated, Timeouts
 from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.estimation import Estimate
 from handeye.notations import SHOWN
 from handeye.planning.collisions import Body
 from handeye.planning.constraints import ViewLimits
@@ -34,7 +35,6 @@ from handeye.session.observer import Observer
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore
-from handeye.solving import Estimate
 from handeye.types import Mounting
 from handeye.types.calibration import MM_PER_M, ModelName
 

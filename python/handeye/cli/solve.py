@@ -14,12 +14,12 @@ from handeye.cli.page import Page, serve, show_views
 from handeye.cli.solve_poses import answer_for_poses
 from handeye.cli.source import Source, mindful_of
 from handeye.datasets import PosePairs
+from handeye.estimation import Measurements, make_estimator
+from handeye.estimation import solve as solve_recording
+from handeye.estimation.confidence import Ellipsoid, position_region, within
+from handeye.estimation.mistakes import examine
 from handeye.importing import Opened
 from handeye.robots import ArmKinematics
-from handeye.solving import Measurements, make_estimator
-from handeye.solving import solve as solve_recording
-from handeye.solving.confidence import Ellipsoid, position_region, within
-from handeye.solving.mistakes import examine
 from handeye.types.calibration import Calibration, JointOffset, ModelName, RobotSide
 
 if TYPE_CHECKING:

@@ -2,9 +2,9 @@
 
 from handeye.cameras.protocol import Grey
 from handeye.detection import Detection
+from handeye.estimation import Estimate
 from handeye.robots.protocol import Goal, Reading
 from handeye.session.entry import Entry
-from handeye.solving import Estimate
 
 
 class Observer:

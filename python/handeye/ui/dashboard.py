@@ -12,11 +12,11 @@ from handeye.cameras.protocol import Grey
 from handeye.datasets.images import read_image
 from handeye.detection import Detection
 from handeye.errors import InputError
+from handeye.estimation import Estimate
 from handeye.robots.protocol import Goal, Reading
 from handeye.session import End, Entry, Observer, SessionStore, Step
 from handeye.session.configuration import Prepared
 from handeye.session.entry import views_of
-from handeye.solving import Estimate
 from handeye.types import View
 from handeye.ui import documents
 from handeye.ui.documents import Picture, Shown

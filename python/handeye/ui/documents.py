@@ -9,13 +9,13 @@ import numpy as np
 from handeye import _core
 from handeye.cameras.protocol import Grey
 from handeye.detection import Detection
+from handeye.estimation import Estimate, Measurements
+from handeye.estimation.confidence import ellipsoid
+from handeye.estimation.estimate import corrected
 from handeye.robots import Arm
 from handeye.robots.frames import frames_of
 from handeye.robots.protocol import Goal, Reading
 from handeye.session.deciding import Considered
-from handeye.solving import Estimate, Measurements
-from handeye.solving.confidence import ellipsoid
-from handeye.solving.estimate import corrected
 from handeye.types import Camera, Mounting, Pose, Target, View
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.calibration import MM_PER_M
