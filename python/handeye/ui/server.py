@@ -95,7 +95,9 @@ class Server:
             ) from error
         self._server.owner = self
         self.host, self.port = host, int(self._server.server_address[1])
-        self._thread = threading.Thread(target=self._server.serve_forever, name="page", daemon=True)
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(0.05,), name="page", daemon=True
+        )
         self._thread.start()
 
     @property
