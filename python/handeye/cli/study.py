@@ -33,6 +33,11 @@ study = App(
 study.command(
     "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
 )
+study.command(
+    "handeye.cli.study_methods:methods",
+    name="methods",
+    help="Compare every method on the same simulated cells.",
+)
 
 
 @Parameter(name="*", group="Study")
