@@ -92,7 +92,7 @@ def test_solve(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     compare(
         "handeye solve",
         handeye.json("solve", shipped),
-        handeye.json("solve", shipped, "--model", "paper"),
+        handeye.json("solve", shipped, "--model", "paper", "--certify"),
         handeye.json("solve", open_directions, "--reduced"),
         handeye.json("solve", of_arm, "--robot", "ur5e"),
         handeye.json("solve", bag, "--target", tmp_path / "board.json", "--reduced"),
