@@ -21,7 +21,7 @@ KIND = Kind(
     "writes the points where they are with the rows shifted back; pictures themselves are left out",
 )
 LARGEST = 0.4
-TRIED = 17
+TRIED, ROUNDS = 9, 7
 # A shear shows in that a small one the same way brings the residual down to this share.
 PROBE, PROBE_SHARE = 0.005, 0.98
 
@@ -53,7 +53,7 @@ def find_shear(measurements: Measurements) -> tuple[float, float]:
     if nearby[0] > PROBE_SHARE * best[0]:
         return 0.0, best[0]
     width, centre = 0.5 * LARGEST, 0.5 * LARGEST * float(np.sign(nearby[1]))
-    for _ in range(3):
+    for _ in range(ROUNDS):
         tried = (centre + np.linspace(-width, width, TRIED)).tolist()
         best = min(best, *((left(shear), shear) for shear in tried))
         centre, width = best[1], 2 * width / (TRIED - 1)

@@ -46,30 +46,56 @@ LENS = Kind(
     "writes a camera calibrated from the same pictures",
 )
 ALL = (OTHER_SIZE, CROPPED, STRETCHED, LENS)
-# Focal lengths and centre that differ by less do not count.
-SHARE = 0.04
-CENTRE_SHARE = 0.02
+# What is known of focal lengths and centre beside the covariance of the new calibration, relative to the focal
+# length; and what another free number must bring of the squared distance to be believed.
+KNOWN_SHARE = 3e-3
+PER_NUMBER = 10.0
 
 
 def told(given: Camera, found: Camera) -> tuple[Kind, str]:
-    """Return what is wrong with a camera, by the one that the pictures ask for."""
-    fx, fy, cx, cy = found.parameters[:4] / given.parameters[:4]
-    shift = (found.parameters[2:4] - given.parameters[2:4]) / given.size_px[0]
-    focal = float(np.sqrt(fx * fy))
-    if abs(np.log(fx / fy)) > SHARE:
-        return STRETCHED, f"the pictures are stretched: by {fx:.3f} along rows and {fy:.3f} along columns"
-    alike = max(abs(np.log(cx / focal)), abs(np.log(cy / focal))) < max(2 * SHARE, 0.5 * abs(np.log(focal)))
-    if abs(np.log(focal)) > SHARE and alike:
-        width, height = (round(focal * side) for side in given.size_px)
+    """Return what is wrong with a camera, by the one that the pictures ask for.
+
+    Of the ways to change focal lengths and centre (none, one factor, another centre, two factors) the one is
+    taken whose nearest camera is nearest to that of the pictures, in standard deviations.
+    """
+    was, now = given.parameters[:4], found.parameters[:4]
+    covariance = np.diag(np.full(4, (KNOWN_SHARE * now[0]) ** 2))
+    if found.covariance is not None:
+        covariance = covariance + found.covariance[:4, :4]
+    fx, fy, cx, cy = was
+    zero = np.zeros(4)
+    ways = {
+        LENS.code: (was, np.zeros((4, 0))),
+        OTHER_SIZE.code: (zero, was[:, np.newaxis]),
+        CROPPED.code: (was, np.eye(4)[:, 2:]),
+        STRETCHED.code: (zero, np.array([[fx, 0], [0, fy], [cx, 0], [0, cy]])),
+    }
+    weight = np.linalg.inv(covariance)
+    best, numbers = LENS.code, np.zeros(0)
+    least = np.inf
+    for code, (start, columns) in ways.items():
+        values = np.linalg.solve(columns.T @ weight @ columns, columns.T @ weight @ (now - start))
+        away = now - start - columns @ values
+        distance = float(away @ weight @ away) + PER_NUMBER * columns.shape[1]
+        if distance < least:
+            best, numbers, least = code, values, distance
+    return _words(best, given, numbers.tolist())
+
+
+def _words(code: str, given: Camera, numbers: list[float]) -> tuple[Kind, str]:
+    if code == STRETCHED.code:
+        along = f"by {numbers[0]:.3f} along rows and {numbers[1]:.3f} along columns"
+        return STRETCHED, f"the pictures are stretched: {along}"
+    if code == OTHER_SIZE.code:
+        width, height = (round(numbers[0] * side) for side in given.size_px)
         return OTHER_SIZE, (
             "the camera is calibrated for pictures of another size: focal length and centre that the "
-            f"pictures ask for are {focal:.3f} times those stated (as if {given.width_px} x "
+            f"pictures ask for are {numbers[0]:.3f} times those stated (as if {given.width_px} x "
             f"{given.height_px} pixels had been {width} x {height})"
         )
-    if np.abs(shift).max() > CENTRE_SHARE and abs(np.log(focal)) < 2 * SHARE:
-        u, v = (given.parameters[2:4] - found.parameters[2:4]).tolist()
+    if code == CROPPED.code:
         return CROPPED, (
-            f"the pictures are cropped: the centre that they ask for lies {u:+.0f} px and {v:+.0f} px from "
-            "that of the camera"
+            f"the pictures are cropped: the centre that they ask for lies {numbers[0]:+.0f} px and "
+            f"{numbers[1]:+.0f} px from that of the camera"
         )
     return LENS, "the distortion of the camera is not that of the pictures"
