@@ -17,6 +17,8 @@ KIND = Kind(
     "leaves the copies out",
 )
 
+FEWEST_VIEWS = 3
+
 
 def without_repeated(measurements: Measurements) -> tuple[Measurements, tuple[Finding, ...]]:
     """Leave out views that are copies of others, and name them."""
@@ -29,6 +31,8 @@ def without_repeated(measurements: Measurements) -> tuple[Measurements, tuple[Fi
             copies[view.name] = of
     if not copies:
         return measurements, ()
+    if len(measurements) - len(copies) < FEWEST_VIEWS:
+        return measurements, ()  # That the views are all alike says more.
     kept = [k for k, view in enumerate(measurements.views) if view.name not in copies]
     rejected = measurements.rejected | {name: f"the same as {of}" for name, of in copies.items()}
     originals = listed(list(dict.fromkeys(copies.values())))

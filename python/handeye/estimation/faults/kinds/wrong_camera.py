@@ -38,16 +38,16 @@ LENS = Kind(
     "a wrong distortion of the lens",
     "Coefficients in another order or of another lens, pictures already undistorted, a calibration that went "
     "wrong.",
-    "Through the camera as stated the board's points do not fit any pose; with a distortion found from the "
-    "same pictures they do.",
+    "Through the camera as stated the board's points fit no pose; with a distortion found from the same "
+    "pictures they do.",
     Handling.REFUSED,
     "Calibrate the camera, or leave it out: it is then calibrated from the pictures. For pictures that are "
     "undistorted give zero distortion.",
     "writes a camera calibrated from the same pictures",
 )
 ALL = (OTHER_SIZE, CROPPED, STRETCHED, LENS)
-# What is known of focal lengths and centre beside the covariance of the new calibration, relative to the focal
-# length; and what another free number must bring of the squared distance to be believed.
+# What is known of focal lengths and centre beside the covariance of the new calibration, relative to the
+# focal length; and what another free number must bring of the squared distance to be believed.
 KNOWN_SHARE = 3e-3
 PER_NUMBER = 10.0
 
