@@ -13,7 +13,7 @@ from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder
-from handeye.cli.run_options import Limits, Simulated, Timeouts
+from handeye.cli.run_options import Lens, Limits, Simulated, Timeouts
 from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
@@ -33,6 +33,7 @@ from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore
 from handeye.solving import Estimate
+from handeye.solving.lens_confidence import lens_difference_px
 from handeye.types import Mounting
 from handeye.types.calibration import MM_PER_M, ModelName
 
@@ -64,6 +65,7 @@ def run(
     confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen, like those below
     timeouts: Timeouts = Timeouts(),  # noqa: B008
+    unknown: Lens = Lens(),  # noqa: B008
     simulated: Simulated = Simulated(),  # noqa: B008
     common: Common = Common(),  # noqa: B008
 ) -> Answer:
@@ -89,7 +91,7 @@ def run(
     target
         Target in TOML or JSON; the simulated one is a chessboard.
     camera
-        Calibrated camera in TOML, JSON or ROS's camera_info .yaml.
+        Calibrated camera in TOML, JSON or ROS's camera_info .yaml. Without one the views teach the lens too.
     mounting
         Where the camera sits; in the hand, if nothing is said.
     accuracy_mm
@@ -154,6 +156,9 @@ def run(
             limits.margin_px,
         ),
         patience=timeouts.patience(driver, images),
+        camera_known=not (unknown.uncalibrated and driver == SIMULATED),
+        lens=unknown.lens,
+        accuracy_px=unknown.accuracy_px,
         simulation=simulated.simulation(),
     )
     if (driver == SIMULATED) != (images == SIMULATED):
@@ -316,13 +321,15 @@ def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end:
         raise HandeyeError(
             f"{end.sentence}; the views do not determine the answer", code=end.reason, hint=hint
         )
-    error: Mapping[str, float] | None = None
+    error: dict[str, float] | None = None
     if prepared.truth is not None and prepared.truth.X is not None:
         off = (calibration.X @ prepared.truth.X.inverse()).log()
         error = {
             "translation_mm": MM_PER_M * float(np.linalg.norm(off[:3])),
             "rotation_deg": float(np.rad2deg(np.linalg.norm(off[3:]))),
         }
+        if end.lens_px is not None and prepared.true_camera is not None:
+            error["lens_px"] = lens_difference_px(prepared.true_camera, calibration.camera)
     data: dict[str, Any] = {
         "session": str(folder),
         "report": None if report is None else str(report),
@@ -332,6 +339,7 @@ def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end:
         "views": end.views,
         "attempts": end.attempts,
         "within_95": None if end.reach is None else end.reach.to_dict(),
+        "lens_within_95_px": end.lens_px,
         "true_error": error,
         "collisions_judged": _judged_by(prepared),
         "seed": configuration.seed,
@@ -376,13 +384,12 @@ def _show(console: "Console", data: Mapping[str, Any], end: End, error: Mapping[
                 f"within {end.reach.translation_mm:.3f} mm and {end.reach.rotation_deg:.4f} deg (95 %)",
             )
         )
+    if end.lens_px is not None:
+        lens, (fx, fy) = calibration.camera.lens, calibration.camera.parameters[:2]
+        rows.append(("camera", f"{lens}, f {fx:.1f} and {fy:.1f} px, within {end.lens_px:.2f} px (95 %)"))
     if error is not None:
-        rows.append(
-            (
-                "truth",
-                f"off by {error['translation_mm']:.3f} mm and {error['rotation_deg']:.4f} deg",
-            )
-        )
+        off = f"off by {error['translation_mm']:.3f} mm and {error['rotation_deg']:.4f} deg"
+        rows.append(("truth", off + (f", lens {error['lens_px']:.2f} px" if "lens_px" in error else "")))
     rows.append(("written", data["session"]))
     if data["report"] is not None:
         rows.append(("report", data["report"]))

@@ -21,7 +21,7 @@ from handeye.evaluation.comparison import POLICIES
 from handeye.evaluation.picture_style import INK, POLICY_LOOKS, QUIET, light_grid, plain_ticks
 from handeye.robots import open_arm
 from handeye.session.deciding import START_VIEWS
-from handeye.session.simulated import LENS, PARAMETERS, SIZE_PX, SimulationOptions
+from handeye.session.simulated import LENSES, ORDINARY, SIZE_PX, SimulationOptions
 from handeye.types import Camera, View
 
 _TICKS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10]
@@ -48,7 +48,7 @@ def closed_loop_figure(shown: ClosedLoop) -> Figure:
 def _cell(axis: Axes, shown: ClosedLoop) -> None:
     eye, arm = Eye(), open_arm(shown.options.robot)
     kept = shown.shown
-    camera = Camera(LENS, PARAMETERS, *SIZE_PX)
+    camera = Camera(*LENSES[ORDINARY], *SIZE_PX)
     target = SimulationOptions().target
     poses = {policy: camera_poses(drives[0]) for policy, drives in shown.drives.items()}
     ground = np.array([pose.translation[:2] for some in poses.values() for pose in some] + [[-0.1, 0.0]])

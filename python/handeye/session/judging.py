@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 
 from handeye import _core
@@ -10,9 +11,12 @@ from handeye.errors import HandeyeError
 from handeye.robots.replay import is_near
 from handeye.solving import Estimate, view_pose
 from handeye.types import Camera, Pose, Target, View
+from handeye.types.arrays import FloatArray
 
 # Root mean square error of one view's own pose beyond which its points are no picture of the target.
 LARGEST_RMSE_PX = 3.0
+# By so much of its size in the image a lens may bend the picture of a flat target.
+LARGEST_BEND = 0.08
 # A view this much off what is believed is believed to be wrong, however sure the belief: metres, radians.
 LARGEST_SURPRISE = (0.02, np.deg2rad(3.0))
 SIGMAS = 6.0
@@ -43,7 +47,13 @@ def labeled(camera: Camera, target: Target, detection: Detection, T_base: Pose, 
 
 
 def objection(
-    camera: Camera, target: Target, view: View, estimate: Estimate | None, views: int
+    camera: Camera,
+    target: Target,
+    view: View,
+    estimate: Estimate | None,
+    views: int,
+    *,
+    learning: bool = False,
 ) -> str | None:
     """Say why a view cannot be true, None if it may be.
 
@@ -53,13 +63,18 @@ def objection(
         What the other views say.
     views
         How many these are.
+    learning
+        Whether the views teach the camera: one that does not fit it may be right, and the camera wrong.
     """
     try:
         pose = view_pose(camera, target, view)
     except HandeyeError as error:
-        return error.message.removeprefix(f"view {view.name}: ")
+        return _no_plane(target, view) if learning else error.message.removeprefix(f"view {view.name}: ")
     if pose.rmse_px > LARGEST_RMSE_PX:
-        return f"its points fit the target only to {pose.rmse_px:.1f} px"
+        fits = f"its points fit the target only to {pose.rmse_px:.1f} px"
+        return _no_plane(target, view) if learning else fits
+    if learning and estimate is None:
+        return _no_plane(target, view)
     if estimate is None or views < FEWEST_WITNESSES or not estimate.determined:
         return None
     A = estimate.mounting.chain(view.T_base_flange)
@@ -67,6 +82,24 @@ def objection(
     choices = [pose.T_camera_target] + ([] if pose.mirrored is None else [pose.mirrored[0]])
     complaints = [_surprise(estimate, A, expected, seen) for seen in choices]
     return None if None in complaints else complaints[0]
+
+
+def _no_plane(target: Target, view: View) -> str | None:
+    """Say why points are no picture of a flat target, whatever the camera; None if they may be.
+
+    A homography takes the target into the image but for the distortion of the lens.
+    """
+    points = target.points[view.point_ids, :2]
+    H: FloatArray | None = cv2.findHomography(points, view.pixels)[0]  # pyright: ignore[reportAssignmentType]
+    if H is None:
+        return "its points are no picture of a flat target"
+    mapped: FloatArray = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ H.T
+    off: FloatArray = mapped[:, :2] / mapped[:, 2:] - view.pixels
+    rms = float(np.linalg.norm(off)) / len(points) ** 0.5
+    extent = float(np.ptp(view.pixels, axis=0).max())
+    if not rms <= LARGEST_BEND * extent:
+        return f"its points are {rms:.0f} px from any picture of a flat target"
+    return None
 
 
 def unchanged(view: View, others: Sequence[View]) -> bool:

@@ -4,7 +4,7 @@ What happens next is a function of the journal and the seed alone: after a break
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from handeye.errors import InputError
@@ -17,7 +17,8 @@ from handeye.session.taking import Taker
 from handeye.session.wish import Wish
 from handeye.solving import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
 from handeye.solving.confidence import Within
-from handeye.solving.mistakes import examine
+from handeye.solving.lens_confidence import lens_within_px
+from handeye.solving.mistakes import Examination, examine
 from handeye.types import View
 from handeye.types.calibration import Calibration, ModelName
 
@@ -27,7 +28,10 @@ FEWEST_EXAMINED = 5
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """How a run ended: the answer if the views determine one, and how far off it may be."""
+    """How a run ended: the answer if the views determine one, and how far off it may be.
+
+    `lens_px` is within how many pixels the lens is known, where the views taught it; None otherwise.
+    """
 
     reason: EndReason
     sentence: str
@@ -35,6 +39,7 @@ class End:
     reach: Within | None
     views: int
     attempts: int
+    lens_px: float | None = None
 
 
 Progress = Callable[[Entry, Estimate | None], None]
@@ -74,7 +79,9 @@ class Session:
         known = wish.joints_err and wish.model is ModelName.AUTO
         self._kinematics = chooser.kinematics if known else None
         self._estimator: Estimator = make_estimator(wish.model, self._kinematics)
-        self._measurements = Measurements.of(store.recording.mounting, cell.camera, cell.target)
+        # Where no camera was given there is none until the views teach one.
+        self._learning = store.self_calibration
+        self._measurements = Measurements.of(store.begun_with.mounting, cell.camera, cell.target)
         self._forgiven_up_to: int | None = None
 
     def run(self) -> End:
@@ -108,7 +115,7 @@ class Session:
                 "the arm may still move",
             )
         views = self._usable()
-        measurements = _without_mistakes(self._with(views))
+        measurements = self._planned_from(views)
         if len(measurements) < len(views) and len(views) >= self._wish.most_views:
             return self._end(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
         estimate = self._estimator(measurements) if len(measurements) >= START_VIEWS else None
@@ -155,11 +162,36 @@ class Session:
             self._progress(entry, step.estimate)
         return entry
 
-    def _with(self, views: list[View]) -> Measurements:
-        """Return the measurements of these views; those measured before are not measured again."""
+    def _with(self, views: Sequence[View], teaching: Sequence[View] | None = None) -> Measurements:
+        """Return the measurements of these views; those measured before are not measured again.
+
+        Where no camera was given, through the one that the views teach, or that of `teaching`.
+        """
+        if self._learning is not None:
+            camera = self._learning.camera(views if teaching is None else teaching)
+            empty = replace(self._measurements, views=(), poses=(), rejected={})
+            return empty if camera is None else replace(empty, camera=camera).with_views(views)
         known = {view.name for view in self._measurements.views} | set(self._measurements.rejected)
         self._measurements = self._measurements.with_views(view for view in views if view.name not in known)
         return self._measurements
+
+    def _planned_from(self, views: list[View]) -> Measurements:
+        """Return what to plan from: one wrong view would make all the others look uncertain."""
+        measurements = self._with(views)
+        if len(measurements) < FEWEST_EXAMINED:
+            return measurements
+        try:
+            return self._examined(measurements).measurements
+        except InputError:
+            return measurements  # Shared by all of them; said at the end.
+
+    def _examined(self, measurements: Measurements) -> Examination:
+        """Look for mistakes; a camera that the views teach is found again without those that are wrong."""
+        examination = examine(measurements)
+        kept = examination.measurements.views
+        if self._learning is None or len(kept) == len(measurements):
+            return examination
+        return examine(self._with(measurements.views, kept))
 
     def _end(self, reason: EndReason, sentence: str) -> End:
         entries = self._store.entries
@@ -167,11 +199,11 @@ class Session:
         left_out = [e.view.name for e in entries if e.view is not None and e.view not in views]
         if left_out:
             sentence += f"; without {', '.join(left_out)}, whose joint positions are not those of the arm"
-        calibration, radii = None, None
+        calibration, radii, lens_px = None, None, None
         measurements = self._with(views)
         if len(measurements) >= START_VIEWS:
             try:
-                examination = examine(measurements)
+                examination = self._examined(measurements)
             except InputError as error:
                 if reason not in FAILED:
                     raise
@@ -181,14 +213,5 @@ class Session:
             if estimate.determined:
                 calibration = calibrate_examined(examination, self._wish.model, kinematics=self._kinematics)
                 radii = estimate.within_95
-        return End(reason, sentence, calibration, radii, len(views), len(entries))
-
-
-def _without_mistakes(measurements: Measurements) -> Measurements:
-    """Return what is left to plan from: one wrong view would make all the others look uncertain."""
-    if len(measurements) < FEWEST_EXAMINED:
-        return measurements
-    try:
-        return examine(measurements).measurements
-    except InputError:
-        return measurements  # Shared by all of them; said at the end.
+                lens_px = None if self._learning is None else lens_within_px(estimate)
+        return End(reason, sentence, calibration, radii, len(views), len(entries), lens_px)

@@ -18,7 +18,7 @@ from handeye.robots.simulated import ArmErrors
 from handeye.session.attempt import Patience
 from handeye.session.drivers import MANUAL, REPLAY
 from handeye.session.faults import FaultRates
-from handeye.session.simulated import usual_errors
+from handeye.session.simulated import ORDINARY, usual_errors
 from handeye.session.starting import Start
 from handeye.session.wish import Wish
 from handeye.types import Mounting, Pose, View
@@ -48,6 +48,7 @@ class Simulation:
     occluded_share: float = 0.0
     points_only: float | None = None
     camera_error: float = 1.0
+    lens: str = ORDINARY
 
 
 @dataclass(frozen=True)
@@ -64,8 +65,12 @@ class Configuration:
         Corners of the box that no motion may leave; None only for a simulated cell.
     collisions
         What links are judged by; once a session has begun it is no longer `auto`.
-    start_rad
-        Joints to start from, for an arm that is simulated; others start where they stand.
+    camera_known
+        Whether the camera is calibrated; if not, the views teach it too.
+    lens
+        Of a camera that is not; None to have the views choose.
+    accuracy_px
+        How well such a camera is to be known, see `Wish`.
     """
 
     robot: str | None
@@ -87,6 +92,9 @@ class Configuration:
     collisions: Collisions = Collisions.AUTO
     limits: ViewLimits = field(default_factory=ViewLimits)
     patience: Patience = field(default_factory=Patience)
+    camera_known: bool = True
+    lens: str | None = None
+    accuracy_px: float = 1.0
     simulation: Simulation = field(default_factory=Simulation)
 
     @property
@@ -117,6 +125,7 @@ class Configuration:
             joints_err=self.joints_err,
             refine=self.refine,
             policy=make_policy(self.policy),
+            accuracy_px=None if self.camera_known else self.accuracy_px,
         )
 
     def workspace(self) -> Workspace:

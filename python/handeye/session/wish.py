@@ -32,6 +32,8 @@ class Wish:
         Weigh noise and offsets of the joints as causes of error: the description of the arm is known anyway.
     refine
         Climb from the best candidates to better ones near them, rather than take the best that was drawn.
+    accuracy_px
+        Where the views teach the camera too: how well, see `Requested`. None for a calibrated camera.
 
     Raises
     ------
@@ -50,6 +52,7 @@ class Wish:
     joints_err: bool = True
     refine: bool = True
     policy: Policy = field(default_factory=NextBestView)
+    accuracy_px: float | None = None
 
     def __post_init__(self) -> None:
         self.rules()  # checks what they check
@@ -63,4 +66,4 @@ class Wish:
         number = NumberOfViews(self.most_views)
         if self.accuracy_mm is None or self.accuracy_deg is None:
             return (number,)
-        return Requested(self.accuracy_mm, self.accuracy_deg), number
+        return Requested(self.accuracy_mm, self.accuracy_deg, self.accuracy_px), number

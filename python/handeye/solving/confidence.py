@@ -71,10 +71,10 @@ def within(covariance: FloatArray, degrees_of_freedom: float, probability: float
 
 
 def radius(covariance: FloatArray, degrees_of_freedom: float, probability: float = PROBABILITY) -> float:
-    """Return the radius within which a vector of a covariance (3, 3) lies with a probability, in its unit."""
+    """Return the radius within which a vector of a covariance (n, n) lies with a probability, in its unit."""
     # A fixed sample: the same covariance has the same radius, to a hundredth.
     random = np.random.default_rng(20)
-    draws = random.standard_normal((_DRAWS, 3))
+    draws = random.standard_normal((_DRAWS, len(covariance)))
     if np.isfinite(degrees_of_freedom):
         draws /= np.sqrt(random.chisquare(degrees_of_freedom, _DRAWS) / degrees_of_freedom)[:, np.newaxis]
     variances = np.clip(np.linalg.eigvalsh(covariance), 0, None)
