@@ -20,11 +20,11 @@ import cv2
 import numpy as np
 from measure_loop import ASKED_DEG, ASKED_MM, cell
 
+from handeye.estimation.lens_confidence import lens_difference_px
 from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import EndReason
 from handeye.session.settings import Configuration
 from handeye.session.simulated import LENSES
-from handeye.solving.lens_confidence import lens_difference_px
 
 KINDS = ("none", "white_flange", "encoder", "joint_offsets", "mixture")
 ASKED_PX = 1.0

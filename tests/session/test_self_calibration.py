@@ -10,6 +10,8 @@ import pytest
 from cells import Cell
 from handeye.cameras.protocol import Frame, Points
 from handeye.errors import DeviceError, InputError
+from handeye.estimation import Estimate
+from handeye.estimation.lens_confidence import lens_difference_px
 from handeye.planning import Stop
 from handeye.planning.stopping import State
 from handeye.session import configuration as configurations
@@ -19,8 +21,6 @@ from handeye.session.request import Requested
 from handeye.session.self_calibration import SelfCalibration, nominal_camera
 from handeye.session.simulated import ORDINARY
 from handeye.session.store import open_session
-from handeye.solving import Estimate
-from handeye.solving.lens_confidence import lens_difference_px
 from handeye.types import Mounting, View
 from sessions import Outcome, configured, run
 

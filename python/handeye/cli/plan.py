@@ -18,10 +18,10 @@ from handeye.cli.plan_together import Together, check_together, choose_together,
 from handeye.cli.source import Source, mindful_of
 from handeye.datasets import read_poses
 from handeye.errors import InputError
+from handeye.estimation import Estimate, Measurements, make_estimator
+from handeye.estimation.initialize import check_views
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
 from handeye.planning.prediction import Sight
-from handeye.solving import Estimate, Measurements, make_estimator
-from handeye.solving.initialize import check_views
 from handeye.types.calibration import MM_PER_M, ModelName
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ def plan(
         raise UsageError(f"--speed-deg-s {speed_deg_s}, expected above zero")
     worth = _criterion(criterion, tool_point_mm)
     table = None if candidates is None else read_poses(candidates, source.stated())
-    opened = (source if table is None else source.of_a_recording(folder)).open(folder)
+    opened = (source if table is None else source.of_a_recording(folder)).open(folder, arm.described())
     measurements = Measurements.of_recording(opened.recording)
     check_views(measurements)
     taken = _taken(measurements, used, first, with_file=table is not None)

@@ -17,6 +17,8 @@ from handeye.cli.run_options import Lens, Limits, Simulated, Timeouts
 from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.estimation import Estimate
+from handeye.estimation.lens_confidence import lens_difference_px
 from handeye.notations import SHOWN
 from handeye.planning.collisions import Body
 from handeye.planning.constraints import ViewLimits
@@ -32,8 +34,6 @@ from handeye.session.loop import End, Session
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore
-from handeye.solving import Estimate
-from handeye.solving.lens_confidence import lens_difference_px
 from handeye.types import Mounting
 from handeye.types.calibration import MM_PER_M, ModelName
 

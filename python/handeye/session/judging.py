@@ -8,8 +8,8 @@ import numpy as np
 from handeye import _core
 from handeye.detection import Detection, Prediction, relabeled
 from handeye.errors import HandeyeError
+from handeye.estimation import Estimate, view_pose
 from handeye.robots.replay import is_near
-from handeye.solving import Estimate, view_pose
 from handeye.types import Camera, Pose, Target, View
 from handeye.types.arrays import FloatArray
 

@@ -8,6 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from handeye.errors import InputError
+from handeye.estimation import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
+from handeye.estimation.confidence import Within
+from handeye.estimation.lens_confidence import lens_within_px
+from handeye.estimation.mistakes import Examination, examine
 from handeye.session.attempt import Cell
 from handeye.session.contract import check_at_rest
 from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step
@@ -15,10 +19,6 @@ from handeye.session.entry import Entry
 from handeye.session.store import SessionStore
 from handeye.session.taking import Taker
 from handeye.session.wish import Wish
-from handeye.solving import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
-from handeye.solving.confidence import Within
-from handeye.solving.lens_confidence import lens_within_px
-from handeye.solving.mistakes import Examination, examine
 from handeye.types import View
 from handeye.types.calibration import Calibration, ModelName
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handeye.estimation import Estimate
 from handeye.planning import Planner, PlannerOptions, Pool, Stop
 from handeye.planning.prediction import Sight
 from handeye.planning.travel import Travel
@@ -19,7 +20,6 @@ from handeye.session.deciding import (
     halt_of,
 )
 from handeye.session.wish import Wish
-from handeye.solving import Estimate
 from handeye.types import View
 from handeye.types.arrays import FloatArray
 

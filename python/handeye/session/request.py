@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from handeye.errors import InputError
+from handeye.estimation.lens_confidence import lens_within_px
 from handeye.planning import Stop, StopReason, StopRule
 from handeye.planning.stopping import State
-from handeye.solving.lens_confidence import lens_within_px
 
 
 @dataclass(frozen=True)
