@@ -198,6 +198,8 @@ def _resumed(session: Path, person: Person, confirm: bool | None, *, as_json: bo
         person=person,
         confirm=_confirm(confirm, configuration, person),
     )
+    if store.notice is not None:
+        person.tell(f"warning: {store.notice}")
     return _answer(session, configuration, prepared, _driven(loop, store, prepared))
 
 

@@ -69,6 +69,16 @@ class SessionStore:
         return self._journal.entries
 
     @property
+    def notice(self) -> str | None:
+        """What is to be said of how the journal was found; None for nothing."""
+        if not self._journal.torn:
+            return None
+        return (
+            f"{self.folder / JOURNAL_FILE}: the last line was not written to its end ({self._journal.torn} "
+            f"bytes) and is left out; {len(self.entries)} attempts are whole, and the session goes on there"
+        )
+
+    @property
     def recording(self) -> Recording:
         """The recording of the views so far."""
         return self._recording
