@@ -11,6 +11,7 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.solve_poses import answer_for_poses
 from handeye.cli.source import Source, mindful_of
+from handeye.cli.work import WorkOptions, touch_lines
 from handeye.datasets import PosePairs
 from handeye.importing import Opened
 from handeye.solving import solve as solve_recording
@@ -31,6 +32,7 @@ def solve(
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
+    work: WorkOptions = WorkOptions(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Calibrate from a folder of views.
@@ -60,7 +62,12 @@ def solve(
     with mindful_of(opened.warnings):
         kinematics = arm.kinematics(opened.recording, model)
         calibration = solve_recording(
-            opened.recording, model, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed
+            opened.recording,
+            model,
+            reduced=reduced,
+            kinematics=kinematics,
+            camera_fixed=camera_fixed,
+            work=work.work(),
         )
     region = position_region(calibration)
     data = _data(opened, calibration, region)
@@ -135,6 +142,7 @@ def _show(
             ("accuracy", f"{stated} with 95 % probability (centre of the camera, rotation)"),
             ("standard deviation", f"{accuracy} of position and rotation"),
             ("95 % ellipsoid", f"of the position, semi-axes {axes} mm"),
+            *(() if calibration.touch is None else touch_lines(calibration.touch)),
             ("residuals", residuals),
             ("noise", _noise(calibration)),
             *((f"joint {offset.joint}", _offset(offset)) for offset in calibration.joint_offsets),

@@ -16,6 +16,7 @@ from handeye import _core
 from handeye.detection import Detection, calibrate_camera
 from handeye.errors import SolveError
 from handeye.evaluation.metrics import inverses
+from handeye.evaluation.mixed_arm import MixedArm, level, twist
 from handeye.robots import Arm, open_arm
 from handeye.robots.displaced import displaced, random_displacements
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Target, Truth, View
@@ -59,6 +60,7 @@ class ErrorKind(StrEnum):
 
 
 MIXTURES = (ErrorKind.MIXTURE_CELL, ErrorKind.MIXTURE_CELL_2, ErrorKind.MIXTURE_RANDOM)
+FACTORS = {ErrorKind.MIXTURE_CELL_2: 2.0}
 BOARD_SCALE = 1e-3
 FOCAL_SHARE = 3e-3
 # Deviation of a smooth field of pixel errors, and its length as a share of the board.
@@ -119,8 +121,24 @@ POSTURE_RAD = np.deg2rad([0.0, -110.0, 110.0, -90.0, -90.0, 0.0])
 MOST_ATTEMPTS = 50
 
 
+@dataclass(frozen=True, eq=False)
+class SimulatedCell:
+    """A recording, and what it came from: the true camera, and the arm where everything is wrong a little."""
+
+    recording: Recording
+    camera: Camera
+    arm: MixedArm | None
+
+
 def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *, seed: int = 0) -> Recording:
-    """Return the recording of a cell with its truth, the same for the same number and seed.
+    """Return the recording of a cell with its truth; see `simulate_cell`."""
+    return simulate_cell(kind, number, options, seed=seed).recording
+
+
+def simulate_cell(
+    kind: ErrorKind, number: int, options: CellOptions | None = None, *, seed: int = 0
+) -> SimulatedCell:
+    """Return a cell, the same for the same number and seed.
 
     Raises
     ------
@@ -131,7 +149,7 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
     kind = ErrorKind(kind)
     random = np.random.default_rng([seed, zlib.crc32(kind.encode()), number])
     arm = simulated_arm()
-    pixel_sigma = _level(random, options.pixel_sigma_px)
+    pixel_sigma = level(random, options.pixel_sigma_px)
     calibrated = Camera(LENS, PARAMETERS, *SIZE_PX)
     covariance = _calibration_covariance(random, calibrated, pixel_sigma, options)
     deviation = random.multivariate_normal(np.zeros(len(PARAMETERS)), covariance, method="cholesky")
@@ -142,10 +160,12 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
     true_camera = Camera(LENS, PARAMETERS + deviation, *SIZE_PX)
     X, Y = _mount(random, options.mounting)
     count = int(random.integers(options.views[0], options.views[1] + 1))
-    joints, camera_poses = _views(random, arm, true_camera, X, Y, count, options)
+    joints, camera_poses = draw_views(random, arm, true_camera, X, Y, count, options)
+    mixed = None
     if kind in MIXTURES:
         reported, read = arm.forward(joints), joints
-        true = _mixed(random, kind, arm, joints)
+        mixed = MixedArm.draw(random, arm, kind is ErrorKind.MIXTURE_RANDOM, FACTORS.get(kind, 1.0))
+        true = mixed.stand(random, joints)
         camera_poses = np.array([(X @ options.mounting.chain(Pose(pose)) @ Y).matrix for pose in true])
     else:
         reported, read = _reported(random, kind, arm, joints, options)
@@ -162,7 +182,7 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
         if field is not None:
             pixels = pixels + field @ random.standard_normal(pixels.shape)
         views.append(View(f"view_{k + 1:02d}", Pose(pose), ids, pixels, joints_rad=read[k].tolist()))
-    return Recording(
+    recording = Recording(
         f"simulated {kind.value} {number}",
         options.mounting,
         _calibrated(target, views)
@@ -173,6 +193,7 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
         Truth(X, Y),
         "simulated",
     )
+    return SimulatedCell(recording, true_camera, mixed)
 
 
 @cache
@@ -181,17 +202,8 @@ def simulated_arm() -> Arm:
     return open_arm(ARM)
 
 
-def _level(random: np.random.Generator, bounds: tuple[float, float]) -> float:
-    low, high = bounds
-    return low * (high / low) ** random.uniform()
-
-
 def _in_camera(T_camera_target: FloatArray, target: Target) -> FloatArray:
     return target.points @ T_camera_target[:3, :3].T + T_camera_target[:3, 3]
-
-
-def _twist(random: np.random.Generator, metres: float, degrees: float) -> FloatArray:
-    return np.concatenate([random.normal(0, metres, 3), random.normal(0, np.deg2rad(degrees), 3)])
 
 
 def _look(down: FloatArray) -> FloatArray:
@@ -203,16 +215,16 @@ def _look(down: FloatArray) -> FloatArray:
 
 def _mount(random: np.random.Generator, mounting: Mounting) -> tuple[Pose, Pose]:
     """Draw X and Y of the chain."""
-    jitter = Pose.exp(_twist(random, 0.05, 15.0)) @ Pose.exp([0, 0, 0, 0, 0, random.uniform(-np.pi, np.pi)])
+    jitter = Pose.exp(twist(random, 0.05, 15.0)) @ Pose.exp([0, 0, 0, 0, 0, random.uniform(-np.pi, np.pi)])
     if mounting is Mounting.EYE_IN_HAND:
         # The camera beside the tool, looking along it; the board flat on the table, its z axis down.
         T_flange_camera = Pose.exp([0.05, 0, 0.06, 0, 0, 0]) @ jitter
         at = np.array([random.uniform(0.35, 0.5), random.uniform(-0.15, 0.15), random.uniform(-0.35, -0.1)])
-        T_base_target = Pose(_look(at)) @ Pose.exp(_twist(random, 0.0, 5.0))
+        T_base_target = Pose(_look(at)) @ Pose.exp(twist(random, 0.0, 5.0))
         return T_flange_camera.inverse(), T_base_target
     # The camera above the table, looking down; the board on the flange, facing away from it.
     at = np.array([random.uniform(0.35, 0.5), random.uniform(-0.15, 0.15), random.uniform(0.9, 1.1)])
-    T_base_camera = Pose(_look(at)) @ Pose.exp(_twist(random, 0.0, 10.0))
+    T_base_camera = Pose(_look(at)) @ Pose.exp(twist(random, 0.0, 10.0))
     T_flange_target = Pose.exp([0, 0, 0.05, 0, 0, 0]) @ jitter @ Pose(_look(np.zeros(3)))
     return T_base_camera.inverse(), T_flange_target
 
@@ -237,7 +249,7 @@ def _camera_pose(random: np.random.Generator, camera: Camera, options: CellOptio
     return pose if seen.all() and inside.all() else None
 
 
-def _views(
+def draw_views(
     random: np.random.Generator,
     arm: Arm,
     camera: Camera,
@@ -322,70 +334,30 @@ def _field_root(points: FloatArray) -> FloatArray:
     return FIELD_PX * vectors * np.sqrt(np.maximum(values, 0))
 
 
-def _mixed(random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray) -> FloatArray:
-    """Return where the flange (K, 4, 4) truly stands of an arm in which everything is wrong a little.
-
-    Levels of the cell are those of an arm in good order; drawn ones are log-uniform over a decade about them.
-    """
-    level = {
-        "encoder_deg": 0.005,
-        "offset_deg": 0.01,
-        "length_m": 1e-4,
-        "twist_deg": 0.0,
-        "play_deg": 0.005,
-        "pose_m": 0.0,
-        "pose_deg": 0.0,
-    }
-    if kind is ErrorKind.MIXTURE_RANDOM:
-        bounds = {
-            "encoder_deg": (0.002, 0.02),
-            "offset_deg": (0.005, 0.05),
-            "length_m": (0.05e-3, 0.5e-3),
-            "twist_deg": (0.003, 0.03),
-            "play_deg": (0.002, 0.02),
-            "pose_m": (0.005e-3, 0.1e-3),
-            "pose_deg": (0.0005, 0.01),
-        }
-        level = {name: _level(random, range_) for name, range_ in bounds.items()}
-    if kind is ErrorKind.MIXTURE_CELL_2:
-        level = {name: 2 * value for name, value in level.items()}
-    offsets = float(np.deg2rad(level["offset_deg"])) * random.standard_normal(len(arm))
-    offsets[[0, -1]] = 0.0
-    twist_rad = float(np.deg2rad(level["twist_deg"]))
-    built = displaced(arm, random_displacements(random, arm, level["length_m"], twist_rad))
-    noise = float(np.deg2rad(level["encoder_deg"])) * random.standard_normal(joints.shape)
-    play = 0.5 * float(np.deg2rad(level["play_deg"])) * np.sign(random.standard_normal(joints.shape))
-    both = [
-        _core.se3_exp(np.array([_twist(random, level["pose_m"], level["pose_deg"]) for _ in joints]))
-        for _ in range(2)
-    ]
-    return both[0] @ built.forward(joints + offsets + noise - play) @ both[1]
-
-
 def _reported(
     random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray, options: CellOptions
 ) -> tuple[FloatArray, FloatArray]:
     """`T_base_flange` (K, 4, 4) and joints (K, 6) as the robot reports them; it truly stands at `joints`."""
     true = arm.forward(joints)
     if kind in {ErrorKind.WHITE_FLANGE, ErrorKind.WHITE_BASE, ErrorKind.ROBOT_NOISE_1_DEG}:
-        degrees = 1.0 if kind is ErrorKind.ROBOT_NOISE_1_DEG else _level(random, options.rotation_sigma_deg)
+        degrees = 1.0 if kind is ErrorKind.ROBOT_NOISE_1_DEG else level(random, options.rotation_sigma_deg)
         if options.translation_sigma_m is None:
-            metres = np.deg2rad(degrees) * _level(random, options.lever_m)
+            metres = np.deg2rad(degrees) * level(random, options.lever_m)
         else:
-            metres = _level(random, options.translation_sigma_m)
-        errors = _core.se3_exp(np.array([_twist(random, metres, degrees) for _ in joints]))
+            metres = level(random, options.translation_sigma_m)
+        errors = _core.se3_exp(np.array([twist(random, metres, degrees) for _ in joints]))
         return errors @ true if kind is ErrorKind.WHITE_BASE else true @ errors, joints
     if kind is ErrorKind.ENCODER:
-        sigma = np.deg2rad(_level(random, options.encoder_sigma_deg))
+        sigma = np.deg2rad(level(random, options.encoder_sigma_deg))
         read = joints + sigma * random.standard_normal(joints.shape)
         return arm.forward(read), read
     if kind is ErrorKind.JOINT_OFFSETS:
-        offsets = np.deg2rad(_level(random, options.offset_sigma_deg)) * random.standard_normal(6)
+        offsets = np.deg2rad(level(random, options.offset_sigma_deg)) * random.standard_normal(6)
         offsets[[0, 5]] = 0.0
         return arm.forward(joints + offsets), joints + offsets
     if kind is ErrorKind.SMOOTH_KINEMATIC:
-        metres = _level(random, options.length_sigma_m)
-        degrees = _level(random, options.twist_sigma_deg)
+        metres = level(random, options.length_sigma_m)
+        degrees = level(random, options.twist_sigma_deg)
         built = random_displacements(random, arm, metres, float(np.deg2rad(degrees)))
         return displaced(arm, built).forward(joints), joints
     return true, joints

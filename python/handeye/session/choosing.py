@@ -16,11 +16,12 @@ from handeye.planning.solids import SolidLinks
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
-from handeye.session.deciding import EndReason, Halt, Situation, Step, decision_of, estimator_of, halt_of
+from handeye.session.deciding import EndReason, Halt, Situation, Step, decision_of, halt_of
 from handeye.session.entry import TRANSIENT, Entry, Failure
 from handeye.session.starting import Start, starting_goal
 from handeye.session.wish import Wish
 from handeye.solving import Estimate
+from handeye.solving.estimate import answering
 from handeye.types import Camera, Pose
 
 
@@ -146,6 +147,7 @@ class ArmChooser:
         drawn = self._generator.draw(estimate, postures, random, shunned=shunned)
         options = PlannerOptions(
             policy=self._wish.policy,
+            criterion=self._wish.criterion(estimate, situation.measurements),
             stop_rules=self._wish.rules(),
             sight=drawn.sight,
             seed=self._wish.seed,
@@ -154,7 +156,7 @@ class ArmChooser:
                 np.minimum(self._arm.velocities, self._wish.speed_rad_s),
             ),
         )
-        planner = Planner(situation.measurements, drawn.pool, estimator_of(estimate), options)
+        planner = Planner(situation.measurements, drawn.pool, answering(estimate), options)
         turned_down = dict(drawn.turned_down)
         joints_of = dict(drawn.joints)
         answer = planner.ask()

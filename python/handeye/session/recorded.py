@@ -9,17 +9,10 @@ from handeye.planning.prediction import Sight
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics, arm_kinematics
 from handeye.robots.protocol import Goal
-from handeye.session.deciding import (
-    EndReason,
-    Halt,
-    Situation,
-    Step,
-    decision_of,
-    estimator_of,
-    halt_of,
-)
+from handeye.session.deciding import EndReason, Halt, Situation, Step, decision_of, halt_of
 from handeye.session.wish import Wish
 from handeye.solving import Estimate
+from handeye.solving.estimate import answering
 from handeye.types import View
 from handeye.types.arrays import FloatArray
 
@@ -73,12 +66,13 @@ class RecordedChooser:
         pool = Pool.of_views(left)
         options = PlannerOptions(
             policy=self._wish.policy,
+            criterion=self._wish.criterion(estimate, situation.measurements),
             stop_rules=self._wish.rules(),
             sight=Sight(known=True),
             seed=self._wish.seed,
             travel=self._travel(situation, pool),
         )
-        planner = Planner(situation.measurements, pool, estimator_of(estimate), options)
+        planner = Planner(situation.measurements, pool, answering(estimate), options)
         answer = planner.ask()
         if isinstance(answer, Stop):
             halt = halt_of(answer)

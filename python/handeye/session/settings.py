@@ -21,6 +21,7 @@ from handeye.session.faults import FaultRates
 from handeye.session.simulated import usual_errors
 from handeye.session.starting import Start
 from handeye.session.wish import Wish
+from handeye.solving.work import Work
 from handeye.types import Mounting, Pose, View
 from handeye.types.calibration import ModelName
 from handeye.types.plain import read_document
@@ -64,6 +65,8 @@ class Configuration:
         Corners of the box that no motion may leave; None only for a simulated cell.
     collisions
         What links are judged by; once a session has begun it is no longer `auto`.
+    touch_mm, work
+        Touch error to reach in place of the accuracy, and what is seen and touched.
     start_rad
         Joints to start from, for an arm that is simulated; others start where they stand.
     """
@@ -88,6 +91,8 @@ class Configuration:
     limits: ViewLimits = field(default_factory=ViewLimits)
     patience: Patience = field(default_factory=Patience)
     simulation: Simulation = field(default_factory=Simulation)
+    touch_mm: float | None = None
+    work: Work = field(default_factory=Work)
 
     @property
     def is_simulated(self) -> bool:
@@ -117,6 +122,8 @@ class Configuration:
             joints_err=self.joints_err,
             refine=self.refine,
             policy=make_policy(self.policy),
+            touch_mm=self.touch_mm,
+            work=self.work,
         )
 
     def workspace(self) -> Workspace:
