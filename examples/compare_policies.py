@@ -2,8 +2,8 @@
 
 from handeye.datasets import read_recording
 from handeye.datasets.shipped import shipped_recording
-from handeye.evaluation.comparison import POLICIES, Comparison, compare
-from handeye.evaluation.protocol import Protocol
+from handeye.studies.comparison import POLICIES, Comparison, compare
+from handeye.studies.protocol import Protocol
 from handeye.types.calibration import ModelName
 
 recording = read_recording(shipped_recording()).recording

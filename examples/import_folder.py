@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 
 from handeye.datasets import write_recording
+from handeye.estimation import solve
 from handeye.importing import SourceOptions, open_folder
-from handeye.solving import solve
 from handeye.types import Pose
 
 FINER = 4  # pictures are drawn larger and averaged, as a sensor does

@@ -6,9 +6,9 @@ replace `take` by moving to the pose, taking a picture, and detecting the target
 
 from handeye.datasets import read_recording
 from handeye.datasets.shipped import shipped_recording
+from handeye.estimation import Measurements, make_estimator
 from handeye.planning import Accuracy, Candidate, Planner, PlannerOptions, Pool, Stop
 from handeye.planning.prediction import Sight
-from handeye.solving import Measurements, make_estimator
 from handeye.types import View
 from handeye.types.calibration import ModelName
 

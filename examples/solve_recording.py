@@ -4,8 +4,8 @@ import numpy as np
 
 from handeye.datasets import read_recording
 from handeye.datasets.shipped import shipped_recording
-from handeye.solving import solve
-from handeye.solving.confidence import within
+from handeye.estimation import solve
+from handeye.estimation.confidence import within
 
 # A folder with recording.toml and corners/; this one comes with the package.
 recording = read_recording(shipped_recording()).recording

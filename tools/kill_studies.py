@@ -19,11 +19,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from clusters import local_cluster
-from handeye.evaluation.checkpoint import FILE, Checkpoint
-from handeye.evaluation.cluster import Cluster
-from handeye.evaluation.parallel import Workers
-from handeye.evaluation.simulate import CellOptions
-from handeye.evaluation.studies.coverage import CASES, study_coverage
+from handeye.compute.checkpoint import FILE, Checkpoint
+from handeye.compute.cluster import Cluster
+from handeye.compute.parallel import Workers
+from handeye.simulation.cells import CellOptions
+from handeye.studies.coverage import CASES, study_coverage
 from handeye.types import Chessboard
 from handeye.types.calibration import ModelName
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from handeye.datasets import read_camera, read_recording, read_target, write_recording
     from handeye.detection import detect
     from handeye.errors import HandeyeError
+    from handeye.estimation import solve
     from handeye.importing import SourceOptions, open_folder
     from handeye.planning import plan
-    from handeye.solving import solve
     from handeye.types import Camera, Mounting, Pose, Recording, Target, View
 
     __version__: str
@@ -37,7 +37,7 @@ _PLACES = {
     "read_camera": "datasets",
     "read_recording": "datasets",
     "read_target": "datasets",
-    "solve": "solving",
+    "solve": "estimation",
     "write_recording": "datasets",
 }
 

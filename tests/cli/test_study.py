@@ -9,7 +9,7 @@ import pytest
 
 from handeye.cli.boundary import run
 from handeye.datasets import write_recording
-from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
+from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 
 POLICIES = ["next_best_view", "random", "max_distance"]
 

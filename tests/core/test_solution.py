@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from handeye import _core
+from handeye.benchmarks.problems import SIGMA_PX, Cell, make_cell
 from handeye.errors import DegenerateError, InputError
-from handeye.evaluation.benchmarks.problems import SIGMA_PX, Cell, make_cell
 
 VIEWS, POINTS = 5, 16
 

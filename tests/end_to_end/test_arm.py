@@ -7,7 +7,7 @@ import pytest
 
 from commands import Handeye
 from folders import made_recording, written
-from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
+from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.types import Pose
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from commands import Handeye
 from folders import made_recording, photographed, written
-from handeye.solving.calibrate import WHAT_NO_VIEW_SHOWS
+from handeye.estimation.calibrate import WHAT_NO_VIEW_SHOWS
 from handeye.types import Mounting, Pose
 from handeye.types.calibration import ModelName
 

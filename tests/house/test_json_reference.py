@@ -14,8 +14,8 @@ from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
 from handeye.datasets.shipped import shipped_recording
 from handeye.datasets.toml_text import toml_text
-from handeye.evaluation import example_folder
-from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
+from handeye.simulation import example_folder
+from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.types import Charuco, Mounting
 from scenes import scene
 
@@ -189,6 +189,11 @@ def test_twin(handeye: Handeye) -> None:
 def test_coverage(handeye: Handeye) -> None:
     data = handeye.json("study", "coverage", "--trials", "1", "--workers", "1")
     compare("handeye study coverage", data)
+
+
+def test_touch(handeye: Handeye) -> None:
+    options = ("--cells", "1", "--touches", "3", "--workers", "1")
+    compare("handeye study touch", handeye.json("study", "touch", *options))
 
 
 def test_bench(handeye: Handeye) -> None:

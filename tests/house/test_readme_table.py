@@ -7,7 +7,7 @@ import pytest
 
 from handeye.datasets import read_recording
 from handeye.datasets.shipped import shipped_recording
-from handeye.evaluation.demonstration import Way, demonstrate
+from handeye.studies.demonstration import Way, demonstrate
 from handeye.types.calibration import ModelName
 
 README = (Path(__file__).resolve().parents[2] / "README.md").read_text()

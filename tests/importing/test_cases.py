@@ -8,9 +8,9 @@ import pytest
 
 from handeye.datasets import Statement, read_camera
 from handeye.errors import InputError, UnstatedError
+from handeye.estimation import solve
 from handeye.importing import SourceOptions, open_folder
 from handeye.notations import NOTATIONS, Unit
-from handeye.solving import solve
 from handeye.types import Charuco
 
 DATA = os.environ.get("HANDEYE_DATA")

@@ -8,8 +8,8 @@ import pytest
 
 from folders import PICTURE_CAMERA, made_recording, photographed, written
 from handeye.errors import DetectionError, InputError
+from handeye.estimation import solve
 from handeye.importing import CameraOrigin, SourceOptions, open_folder
-from handeye.solving import solve
 from handeye.types import Chessboard, Mounting, Pose
 
 PATTERN = SourceOptions(pattern=(5, 7))

@@ -10,9 +10,9 @@ from folders import PICTURE_BOARD, PICTURE_CAMERA, photographed
 from handeye.datasets import Statement, read_pose_rows
 from handeye.datasets.toml_text import toml_text
 from handeye.errors import InputError, UnstatedError
+from handeye.estimation import solve
 from handeye.importing import SourceOptions, open_folder
 from handeye.notations import NOTATIONS, Unit
-from handeye.solving import solve
 from handeye.types import Chessboard, Pose
 from poses_written import WAYS, table
 

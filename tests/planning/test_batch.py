@@ -7,10 +7,10 @@ import pytest
 
 from cells import Cell
 from handeye.errors import InputError
+from handeye.estimation import AutoEstimator, Estimate, Measurements, paper_estimate
 from handeye.planning import Pool
 from handeye.planning.batch import OBJECTIVES, plan_batch
 from handeye.planning.prediction import Prediction, Sight
-from handeye.solving import AutoEstimator, Estimate, Measurements, paper_estimate
 from handeye.types.arrays import FloatArray
 
 BOX = [[x, y, z] for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (0.4, 0.8)]

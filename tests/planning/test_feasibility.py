@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from handeye.errors import InputError
+from handeye.estimation import Measurements, make_estimator
 from handeye.planning.constraints import ViewLimits
 from handeye.planning.feasibility import Generator
 from handeye.robots import open_arm
 from handeye.session.configuration import begin, prepare
-from handeye.solving import Measurements, make_estimator
 from handeye.types import Mounting
 from handeye.types.calibration import ModelName
 from sessions import configured

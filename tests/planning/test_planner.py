@@ -6,6 +6,8 @@ import pytest
 from cells import Cell
 from handeye import _core
 from handeye.errors import InputError
+from handeye.estimation import AutoEstimator, Measurements, paper_estimate
+from handeye.estimation.accuracy import box_corners, tool_deviations_m
 from handeye.planning import (
     Accuracy,
     GainThreshold,
@@ -21,8 +23,6 @@ from handeye.planning import (
     replay,
 )
 from handeye.planning.prediction import Prediction, Sight, gains
-from handeye.solving import AutoEstimator, Measurements, paper_estimate
-from handeye.solving.accuracy import box_corners, tool_deviations_m
 from handeye.types import Pose, View
 
 

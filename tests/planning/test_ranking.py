@@ -7,9 +7,9 @@ import pytest
 
 from cells import Cell
 from handeye import _core
+from handeye.estimation import Estimate, Measurements, make_estimator
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, rank
 from handeye.planning.prediction import Prediction, Sight
-from handeye.solving import Estimate, Measurements, make_estimator
 from handeye.types import Pose
 from handeye.types.calibration import ModelName
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handeye.estimation import Estimate, Measurements, make_estimator
 from handeye.planning import Planner, PlannerOptions, Proposal, make_policy
 from handeye.planning.constraints import ViewLimits
 from handeye.planning.feasibility import FeasiblePool, Generator
@@ -14,7 +15,6 @@ from handeye.planning.refinement import Refined, Refinement, offered, refine
 from handeye.planning.travel import Travel
 from handeye.robots import ArmKinematics
 from handeye.session.configuration import Prepared, begin, prepare
-from handeye.solving import Estimate, Measurements, make_estimator
 from handeye.types import Mounting
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from handeye.estimation import Measurements, make_estimator
 from handeye.report.document import Within
 from handeye.report.history import MOST_POINTS, attempts, curve, request
 from handeye.session.entry import Entry, Failure
 from handeye.session.settings import Configuration
 from handeye.session.store import create_session
-from handeye.solving import Measurements, make_estimator
 from handeye.types import Pose
 from handeye.types.calibration import ModelName
 from pages import opened_cell

@@ -185,7 +185,7 @@ def test_only_the_worst_of_very_many_views_are_drawn() -> None:
 
 def test_result_alone_makes_a_page(tmp_path: Path) -> None:
     opened = opened_cell()
-    from handeye.solving import solve
+    from handeye.estimation import solve
 
     solved = solve(opened.recording)
     path = tmp_path / "result.json"

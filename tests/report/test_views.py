@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from cells import Cell
+from handeye.estimation import Measurements, calibrate
 from handeye.report.views import robot_error, view_lines, view_picture
-from handeye.solving import Measurements, calibrate
 from handeye.types import Mounting, Pose, Recording
 from handeye.types.calibration import Calibration, ModelName, Noise, RobotSide
 

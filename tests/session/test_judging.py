@@ -3,8 +3,8 @@
 import numpy as np
 
 from cells import Cell
+from handeye.estimation import Measurements, make_estimator
 from handeye.session.judging import LEAST_MARGIN_PX, foreseen
-from handeye.solving import Measurements, make_estimator
 from handeye.types.calibration import ModelName
 
 

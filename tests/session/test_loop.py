@@ -10,6 +10,7 @@ import pytest
 from handeye.cameras.simulated import Optics
 from handeye.datasets import read_recording
 from handeye.errors import DeviceError, InputError
+from handeye.estimation import solve
 from handeye.robots import ArmKinematics, open_arm
 from handeye.robots.protocol import Goal
 from handeye.session.attempt import Cell, Missed, attempt
@@ -24,7 +25,6 @@ from handeye.session.settings import Configuration
 from handeye.session.simulated import SimulatedCell, SimulationOptions, simulated_cell
 from handeye.session.store import SessionStore, create_session
 from handeye.session.wish import Wish
-from handeye.solving import solve
 from handeye.types import Chessboard, CircleGrid, Mounting, Pose
 from sessions import configured
 

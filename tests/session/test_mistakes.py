@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from handeye.errors import DeviceError
+from handeye.estimation.mistakes import CODES
 from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import EndReason
 from handeye.session.journal import read_journal
 from handeye.session.loop import End
-from handeye.solving.mistakes import CODES
 from handeye.types import Pose
 from sessions import configured
 

@@ -11,7 +11,7 @@ from folders import made_recording, written
 from handeye.datasets import read_recording, write_recording
 from handeye.datasets.images import read_image
 from handeye.errors import InputError
-from handeye.evaluation.simulate import CellOptions, ErrorKind, simulate
+from handeye.estimation import solve
 from handeye.robots.protocol import Goal
 from handeye.robots.replay import ReplayRobot
 from handeye.session.configuration import Prepared, begin, go_on, prepare
@@ -20,7 +20,7 @@ from handeye.session.entry import Failure
 from handeye.session.loop import End
 from handeye.session.settings import Configuration
 from handeye.session.store import SessionStore
-from handeye.solving import solve
+from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.types import Pose, View
 from sessions import Outcome, configured, run
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from handeye.estimation.confidence import radius
 from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import Step
 from handeye.session.request import Requested
-from handeye.solving.confidence import radius
 from sessions import configured
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from folders import made_recording
-from handeye.solving import solve
+from handeye.estimation import solve
 
 
 def test_the_covariance_is_in_the_order_that_it_names() -> None:

@@ -1,5 +1,6 @@
 """`handeye bench`: how fast solver and scorer are on this machine, beside other ways to the same answers."""
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -48,16 +49,20 @@ def bench(
     output
         Folder for the table (results.md) and the JSON object (results.json); made if it does not exist.
     """
+    if find_spec("handeye.benchmarks") is None:
+        raise UsageError(
+            "the benchmarks come with the source of handeye, not with the wheel; run it from a clone"
+        )
     # Libraries count the cores when they are loaded: they must find one.
-    from handeye.evaluation.benchmarks.machine import one_core  # noqa: PLC0415
+    from handeye.benchmarks.machine import one_core  # noqa: PLC0415
 
     if not 0 <= budget_s <= 60 or seed < 0:
         raise UsageError("--budget-s lies between 0 and 60 and --seed is not below 0")
     check_folder(output)
     with one_core():
-        from handeye.evaluation.benchmarks.markdown import markdown  # noqa: PLC0415
-        from handeye.evaluation.benchmarks.options import Options  # noqa: PLC0415
-        from handeye.evaluation.benchmarks.runner import BENCHMARKS, run_benchmarks  # noqa: PLC0415
+        from handeye.benchmarks.markdown import markdown  # noqa: PLC0415
+        from handeye.benchmarks.options import Options  # noqa: PLC0415
+        from handeye.benchmarks.runner import BENCHMARKS, run_benchmarks  # noqa: PLC0415
 
         options = Options(budget_s=budget_s, peers=not no_peers, quick=quick, seed=seed)
         wanted = tuple(dict.fromkeys(names)) or tuple(BENCHMARKS)

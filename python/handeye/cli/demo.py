@@ -13,14 +13,14 @@ from handeye.cli.output import check_new_folder, check_picture, write_figure
 from handeye.cli.progress import progress
 from handeye.datasets import read_recording
 from handeye.datasets.shipped import shipped_recording
-from handeye.evaluation.demonstration import Demonstration, Way, demonstrate
-from handeye.evaluation.demonstration_picture import demonstration_figure
+from handeye.studies.demonstration import Demonstration, Way, demonstrate
+from handeye.studies.demonstration_picture import demonstration_figure
 from handeye.types.calibration import ModelName
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from handeye.evaluation.closed_loop import ClosedLoop
+    from handeye.studies.closed_loop import ClosedLoop
 
 # Fewer are done before another process has begun to work.
 STARTS_PER_WORKER = 12
@@ -90,7 +90,7 @@ def demo(
 
 def _example(folder: Path, seed: int) -> Answer:
     check_new_folder(folder)
-    from handeye.evaluation.example_folder import POSES_FILE, TARGET_FILE, write_example  # noqa: PLC0415
+    from handeye.simulation.example_folder import POSES_FILE, TARGET_FILE, write_example  # noqa: PLC0415
 
     with progress("Rendering pictures") as advance:
         example = write_example(folder, seed, progress=advance)
@@ -114,8 +114,8 @@ def _example(folder: Path, seed: int) -> Answer:
 def _closed_loop(picture: Path, folder: Path, cells: int, points_only: float | None, seed: int) -> Answer:
     check_new_folder(folder)
     from handeye.cli.session_report import report_of_session  # noqa: PLC0415 - the recording needs none of it
-    from handeye.evaluation.closed_loop import LoopOptions, drive_cells  # noqa: PLC0415
-    from handeye.evaluation.closed_loop_picture import closed_loop_figure  # noqa: PLC0415
+    from handeye.studies.closed_loop import LoopOptions, drive_cells  # noqa: PLC0415
+    from handeye.studies.closed_loop_picture import closed_loop_figure  # noqa: PLC0415
 
     options = LoopOptions(cells=cells, seed=seed, points_only=points_only)
     workers = max(1, min(os.cpu_count() or 1, cells))

@@ -14,8 +14,8 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_output
 from handeye.cli.source import Source
 from handeye.datasets.writing import replace_file
+from handeye.estimation import solve
 from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text, moveit_samples, read_result
-from handeye.solving import solve
 from handeye.types import Pose
 from handeye.types.calibration import ModelName
 

@@ -19,13 +19,13 @@ from handeye.cli.source import Source, mindful_of
 from handeye.cli.work import WorkOptions, check_touch, touch_lines
 from handeye.datasets import read_poses
 from handeye.errors import InputError
+from handeye.estimation import Estimate, Measurements, make_estimator
+from handeye.estimation.estimate import answering
+from handeye.estimation.initialize import check_views
+from handeye.estimation.work import Work, touch_where_possible
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
 from handeye.planning.prediction import Sight
 from handeye.planning.touch import touch_criterion
-from handeye.solving import Estimate, Measurements, make_estimator
-from handeye.solving.estimate import answering
-from handeye.solving.initialize import check_views
-from handeye.solving.work import Work, touch_where_possible
 from handeye.types.calibration import MM_PER_M, ModelName
 from handeye.types.touch import TouchMap
 
@@ -130,12 +130,12 @@ def plan(
     """
     check_output(output)
     _check(used, first, top)
-    check_together(together, criterion)
     if not 0 < speed_deg_s < float("inf"):
         raise UsageError(f"--speed-deg-s {speed_deg_s}, expected above zero")
     check_touch(touch_mm)
     if criterion is None:
         criterion = Criterion.ENTROPY if touch_mm is None else Criterion.TOUCH
+    check_together(together, criterion)
     if (criterion is Criterion.TOOL_POINT) != (tool_point_mm is not None):
         raise UsageError("--criterion tool_point and --tool-point-mm go together")
     table = None if candidates is None else read_poses(candidates, source.stated())

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from handeye.cli.failures import UsageError
+from handeye.estimation import Estimate
 from handeye.planning import Candidate, Pool
 from handeye.planning.batch import OBJECTIVES, BatchPlan, plan_batch
 from handeye.planning.ordering import METRES_PER_RADIAN, Measure, Route, travel_order
 from handeye.planning.prediction import Sight
 from handeye.robots import ArmKinematics
-from handeye.solving import Estimate
 from handeye.types import View
 from handeye.types.calibration import MM_PER_M
 

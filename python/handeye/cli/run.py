@@ -18,6 +18,7 @@ from handeye.cli.session_report import report_of_session
 from handeye.cli.work import WorkOptions, check_touch
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.estimation import Estimate
 from handeye.notations import SHOWN
 from handeye.planning.collisions import Body
 from handeye.planning.constraints import ViewLimits
@@ -33,7 +34,6 @@ from handeye.session.loop import End, Session
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore
-from handeye.solving import Estimate
 from handeye.types import Mounting
 from handeye.types.calibration import MM_PER_M, ModelName
 

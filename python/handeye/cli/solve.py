@@ -13,9 +13,9 @@ from handeye.cli.solve_poses import answer_for_poses
 from handeye.cli.source import Source, mindful_of
 from handeye.cli.work import WorkOptions, touch_lines
 from handeye.datasets import PosePairs
+from handeye.estimation import solve as solve_recording
+from handeye.estimation.confidence import Ellipsoid, position_region, within
 from handeye.importing import Opened
-from handeye.solving import solve as solve_recording
-from handeye.solving.confidence import Ellipsoid, position_region, within
 from handeye.types.calibration import Calibration, JointOffset, ModelName, RobotSide
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
 
-    from handeye.evaluation.parallel import Workers
+    from handeye.compute.parallel import Workers
     from handeye.types import Recording
 
 study = App(
@@ -30,6 +30,9 @@ study = App(
     result_action="return_value",
 )
 # Imported when it runs.
+study.command(
+    "handeye.cli.study_touch:touch", name="touch", help="Count how often the tool lands where it is said to."
+)
 study.command(
     "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
 )
@@ -83,11 +86,11 @@ class Trials:
         """Who does the work, and what keeps it."""
         workers: Workers = self.processes
         if self.scheduler is not None:
-            from handeye.evaluation.cluster import Cluster  # noqa: PLC0415 - rarely wanted
+            from handeye.compute.cluster import Cluster  # noqa: PLC0415 - rarely wanted
 
             workers = Cluster(self.scheduler)
         if self.checkpoint is not None:
-            from handeye.evaluation.checkpoint import Checkpoint  # noqa: PLC0415 - rarely wanted
+            from handeye.compute.checkpoint import Checkpoint  # noqa: PLC0415 - rarely wanted
 
             workers = Checkpoint(self.checkpoint, workers)
         return workers
@@ -111,9 +114,9 @@ class Data:
         Raises
         ------
         InputError, DetectionError, DegenerateError, SolveError
-            As `handeye.evaluation.data.load_sets`.
+            As `handeye.studies.data.load_sets`.
         """
-        from handeye.evaluation.data import cache_folder, data_folder, load_sets  # noqa: PLC0415
+        from handeye.studies.data import cache_folder, data_folder, load_sets  # noqa: PLC0415
 
         names = self.sets or tuple(usual)
         folder = data_folder(self.data)
@@ -139,8 +142,8 @@ def table1(
     3 random views that determine the answer, the same for every policy, then 5 more by each. The camera is
     calibrated from the set; --model paper takes it and the robot as exact, as the paper does.
     """
-    from handeye.evaluation.data import SIMULATED_SETS  # noqa: PLC0415 - help need not wait for it
-    from handeye.evaluation.studies import study_table1  # noqa: PLC0415
+    from handeye.studies import study_table1  # noqa: PLC0415
+    from handeye.studies.data import SIMULATED_SETS  # noqa: PLC0415 - help need not wait for it
 
     check_folder(trials.output)
     count = trials.count(50)
@@ -156,7 +159,7 @@ def table1(
         )
 
     def pictures() -> "Iterable[tuple[str, Figure]]":
-        from handeye.evaluation.plots import errors_figure  # noqa: PLC0415
+        from handeye.studies.plots import errors_figure  # noqa: PLC0415
 
         panels = (("translation_mm", "translation error (mm)"), ("rotation_deg", "rotation error (deg)"))
         title = f"errors against truth after 3 + 5 views, model {result.model}, {count} random starts"
@@ -188,8 +191,8 @@ def curves(
     A third of the views is held out to measure on. Every candidate of the first step is tried, for the
     scatter of predicted gain against the reduction of the held-out error.
     """
-    from handeye.evaluation.data import REAL_SETS, SIMULATED_SETS  # noqa: PLC0415
-    from handeye.evaluation.studies import study_curves  # noqa: PLC0415
+    from handeye.studies import study_curves  # noqa: PLC0415
+    from handeye.studies.data import REAL_SETS, SIMULATED_SETS  # noqa: PLC0415
 
     check_folder(trials.output)
     count = trials.count(50)
@@ -205,7 +208,7 @@ def curves(
         )
 
     def pictures() -> "Iterable[tuple[str, Figure]]":
-        from handeye.evaluation.plots import curves_figure, scatter_figure  # noqa: PLC0415
+        from handeye.studies.plots import curves_figure, scatter_figure  # noqa: PLC0415
 
         for part in result.sets:
             yield f"curves_{part.name}", curves_figure(result, part)
@@ -241,8 +244,8 @@ def holdout(
     Held-out errors reward an answer that follows the robot's error; the agreement of disjoint halves does
     not.
     """
-    from handeye.evaluation.data import REAL_SETS  # noqa: PLC0415
-    from handeye.evaluation.studies import study_holdout  # noqa: PLC0415
+    from handeye.studies import study_holdout  # noqa: PLC0415
+    from handeye.studies.data import REAL_SETS  # noqa: PLC0415
 
     check_folder(trials.output)
     count = trials.count(50)
@@ -258,7 +261,7 @@ def holdout(
         )
 
     def pictures() -> "Iterable[tuple[str, Figure]]":
-        from handeye.evaluation.plots import errors_figure  # noqa: PLC0415
+        from handeye.studies.plots import errors_figure  # noqa: PLC0415
 
         panels = (
             ("relative_translation_mm", "relative translation error (mm)"),
@@ -294,8 +297,8 @@ def injected(
     On the base side 0.225 mm and 0.0169 deg per axis, on the flange side 0.15 mm and 0.01125 deg, drawn
     again for each random start.
     """
-    from handeye.evaluation.data import SIMULATED_SETS  # noqa: PLC0415
-    from handeye.evaluation.studies import study_injected  # noqa: PLC0415
+    from handeye.studies import study_injected  # noqa: PLC0415
+    from handeye.studies.data import SIMULATED_SETS  # noqa: PLC0415
 
     check_folder(trials.output)
     count = trials.count(50)
@@ -344,8 +347,8 @@ def coverage(
     mounting
         Where the camera sits.
     """
-    from handeye.evaluation.simulate import CellOptions  # noqa: PLC0415
-    from handeye.evaluation.studies import study_coverage  # noqa: PLC0415
+    from handeye.simulation.cells import CellOptions  # noqa: PLC0415
+    from handeye.studies import study_coverage  # noqa: PLC0415
 
     check_folder(trials.output)
     with progress("Calibrating simulated cells") as advance:
@@ -359,7 +362,7 @@ def coverage(
         )
 
     def pictures() -> "Iterable[tuple[str, Figure]]":
-        from handeye.evaluation.plots import coverage_figure  # noqa: PLC0415
+        from handeye.studies.plots import coverage_figure  # noqa: PLC0415
 
         yield "coverage", coverage_figure(result)
 
@@ -393,7 +396,7 @@ def mistakes(
     kinds
         Mistakes to plant, if not all: flip, swap, shift, moving, gross_pose, wrong_unit, wrong_direction.
     """
-    from handeye.evaluation.studies import Mistake, study_mistakes  # noqa: PLC0415
+    from handeye.studies import Mistake, study_mistakes  # noqa: PLC0415
 
     known = [kind.value for kind in Mistake]
     unknown = [kind for kind in kinds if kind not in known]

@@ -66,8 +66,8 @@ def twin(
     output
         Folder for the pictures and the JSON object; made if it does not exist.
     """
-    from handeye.evaluation.studies.twin import MODELS, study_twin  # noqa: PLC0415 - help need not wait for it
-    from handeye.evaluation.twin import TwinOptions  # noqa: PLC0415
+    from handeye.simulation.twin import TwinOptions  # noqa: PLC0415
+    from handeye.studies.twin import MODELS, study_twin  # noqa: PLC0415 - help need not wait for it
 
     check_folder(output)
     with progress("Calibrating twins from random starts") as advance:
@@ -82,8 +82,8 @@ def twin(
         )
 
     def pictures() -> "Iterable[tuple[str, Figure]]":
-        from handeye.evaluation.plots import curves_figure, scatter_figure  # noqa: PLC0415
-        from handeye.evaluation.twin_plots import table_figure, trajectory_figure  # noqa: PLC0415
+        from handeye.studies.plots import curves_figure, scatter_figure  # noqa: PLC0415
+        from handeye.studies.twin_plots import table_figure, trajectory_figure  # noqa: PLC0415
 
         yield "twin_table", table_figure(result)
         yield "twin_trajectories", trajectory_figure(result)

@@ -13,9 +13,9 @@ from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_output, write_json
 from handeye.cli.progress import progress
 from handeye.cli.source import Source, mindful_of
-from handeye.evaluation.validation import ModelCheck, Validation
-from handeye.evaluation.validation import validate as validate_recording
 from handeye.types.calibration import ModelName
+from handeye.validation.splits import ModelCheck, Validation
+from handeye.validation.splits import validate as validate_recording
 
 if TYPE_CHECKING:
     from rich.console import Console

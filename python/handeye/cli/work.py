@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError
-from handeye.solving.touch import Depth
-from handeye.solving.work import USUAL_TOOL_M, Work
+from handeye.estimation.touch import Depth
+from handeye.estimation.work import USUAL_TOOL_M, Work
 from handeye.types.calibration import MM_PER_M
 from handeye.types.touch import TouchMap, WorkBox
 
@@ -20,7 +20,7 @@ _NAMES = {
     "hand_eye": "the hand-eye",
     "arm": "constants of the arm",
     "board": "the size of the board",
-    "robot_noise": "what the arm errs by anew each time",
+    "robot_noise": "what the arm errs by each time",
 }
 
 
@@ -69,11 +69,8 @@ def touch_lines(found: TouchMap) -> "Iterable[tuple[str, str]]":
 
     where = "the box of work" if found.stated else "where the board was"
     x, y, z = (figures(value * MM_PER_M) for value in found.worst_at_m)
-    yield (
-        "touch error",
-        f"{length_mm(found.mean_m)} on average over {where}, {length_mm(found.worst_m)} at worst (at {x} {y} {z}), "
-        "with 95 % probability",
-    )
+    mean, worst = length_mm(found.mean_m), length_mm(found.worst_m)
+    yield "touch error", f"{mean} on average over {where}, {worst} at worst (at {x} {y} {z} mm), with 95 %"
     shares = ", ".join(f"{_NAMES[name]} {share:.0%}" for name, share in found.named_limits)
     yield "", f"would fall in variance if known exactly: {shares}"
     yield "", found.advice

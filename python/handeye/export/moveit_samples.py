@@ -5,8 +5,8 @@ A list with two row-major 4 x 4 matrices a view, in metres: `effector_wrt_world`
 """
 
 from handeye.errors import InputError
+from handeye.estimation import Measurements
 from handeye.export.base import number
-from handeye.solving import Measurements
 from handeye.types import Pose, Recording
 
 NAME = "moveit_samples"

@@ -22,9 +22,9 @@ from handeye.datasets.images import read_image
 from handeye.datasets.pose_rows import NOTHING_STATED
 from handeye.detection import Detection, Image, Reason, calibrate_camera, detect_all
 from handeye.errors import DetectionError, HandeyeError, InputError
+from handeye.estimation import Measurements
 from handeye.importing.readings import compare
 from handeye.importing.unstated import unstated
-from handeye.solving import Measurements
 from handeye.types import Camera, Mounting, Recording, Target
 
 # So many images from the first on, all with a board of another size: the size was given wrongly, and looking

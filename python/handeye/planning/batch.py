@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from handeye import _core
 from handeye.errors import InputError
+from handeye.estimation.estimate import Estimate, regular_information
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.prediction import Prediction, Sight
-from handeye.solving.estimate import Estimate, regular_information
 from handeye.types.arrays import FloatArray
 
 OBJECTIVES = ("entropy", "entropy_handeye", "tool_point")

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye.errors import InputError
+from handeye.estimation.estimate import Estimate
 from handeye.planning.collisions import Body
 from handeye.planning.prediction import Sight
 from handeye.planning.visibility import obstacles
 from handeye.robots import Arm
-from handeye.solving.estimate import Estimate
 from handeye.types import Mounting
 from handeye.types.arrays import FloatArray, IndexArray
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from handeye.estimation.estimate import Estimate
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import ViewConstraints, ViewLimits, mounted_points, sight_of
 from handeye.planning.prediction import Sight
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
-from handeye.solving.estimate import Estimate
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
 

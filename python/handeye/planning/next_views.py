@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
+from handeye.estimation import Measurements, make_estimator
+from handeye.estimation.initialize import check_views
 from handeye.planning.candidates import Pool
 from handeye.planning.planner import Planner, PlannerOptions
 from handeye.planning.ranking import Ranking, rank
-from handeye.solving import Measurements, make_estimator
-from handeye.solving.initialize import check_views
 from handeye.types.calibration import ModelName
 from handeye.types.pose import Pose
 from handeye.types.recording import Recording

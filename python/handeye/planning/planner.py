@@ -7,13 +7,13 @@ import numpy as np
 
 from handeye import _core
 from handeye.errors import InputError
+from handeye.estimation.estimate import Estimate, Estimator
+from handeye.estimation.measurements import Measurements
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.policies import NextBestView, Policy, Situation
 from handeye.planning.prediction import Sight, gains
 from handeye.planning.stopping import State, Stop, StopRule, first_verdict
 from handeye.planning.travel import Travel
-from handeye.solving.estimate import Estimate, Estimator
-from handeye.solving.measurements import Measurements
 from handeye.types.arrays import FloatArray
 from handeye.types.view import View
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from handeye import _core
 from handeye.errors import DegenerateError
-from handeye.solving.estimate import Estimate
+from handeye.estimation.estimate import Estimate
 from handeye.types.arrays import FloatArray
 from handeye.types.pose import Pose
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye import _core
+from handeye.estimation.estimate import Estimate
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.prediction import Prediction, Sight
 from handeye.planning.visibility import obstacles
-from handeye.solving.estimate import Estimate
 from handeye.types.arrays import FloatArray
 
 

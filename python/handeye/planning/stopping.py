@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from handeye.errors import InputError
-from handeye.solving.accuracy import tool_deviations_m
-from handeye.solving.estimate import Estimate
-from handeye.solving.measurements import Measurements
+from handeye.estimation.accuracy import tool_deviations_m
+from handeye.estimation.estimate import Estimate
+from handeye.estimation.measurements import Measurements
 from handeye.types.arrays import FloatArray
 
 

@@ -4,12 +4,15 @@ from dataclasses import dataclass
 
 from handeye import _core
 from handeye.errors import InputError
+from handeye.estimation.estimate import Estimate
+from handeye.estimation.measurements import Measurements
+from handeye.estimation.touch import touch_rows
+from handeye.estimation.work import Work, lay_out, touch_map
 from handeye.planning.stopping import State, Stop, StopReason, StopRule
-from handeye.solving.estimate import Estimate
-from handeye.solving.measurements import Measurements
-from handeye.solving.touch import touch_rows
-from handeye.solving.work import Work, lay_out, touch_map
 from handeye.types.calibration import MM_PER_M
+
+# As for any request: of fewer views nobody knows how well the noise is known.
+FEWEST_VIEWS = 6
 
 
 def touch_criterion(estimate: Estimate, measurements: Measurements, work: Work) -> _core.Criterion:
@@ -38,7 +41,7 @@ class TouchAccuracy(StopRule):
 
     work: Work
     radius_mm: float
-    fewest_views: int = 6
+    fewest_views: int = FEWEST_VIEWS
 
     def __post_init__(self) -> None:
         if not self.radius_mm > 0:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from handeye.estimation.estimate import Estimate
 from handeye.planning.prediction import Sight
-from handeye.solving.estimate import Estimate
 from handeye.types.arrays import FloatArray
 
 # Candidates whose projected points are held in memory at a time.

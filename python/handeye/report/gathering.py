@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from handeye.estimation import Measurements, calibrate_examined
+from handeye.estimation.estimate import corrected
+from handeye.estimation.mistakes import examine
 from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text
 from handeye.export.result import read_result, read_result_json
 from handeye.importing import Opened
@@ -18,9 +21,6 @@ from handeye.report.recipe import recipe
 from handeye.report.regions import USUAL_DISTANCES_M, at_points, position_axes, rotation_axes, within
 from handeye.report.solved import Solved
 from handeye.report.views import ViewPicture, view_lines, view_picture
-from handeye.solving import Measurements, calibrate_examined
-from handeye.solving.estimate import corrected
-from handeye.solving.mistakes import examine
 from handeye.types import Camera, Mounting, Pose, Recording, Target
 from handeye.types.calibration import MM_PER_M, Calibration, ModelName
 from handeye.types.plain import read_document
@@ -75,7 +75,7 @@ def gather_recording(
     opened
         Where the views come from; a session among them is reported with its request and its failed attempts.
     model, reduced
-        As for `handeye.solving.solve`.
+        As for `handeye.estimation.solve`.
     command
         The command line that makes this report.
     made
@@ -84,7 +84,7 @@ def gather_recording(
     Raises
     ------
     InputError, DegenerateError, SolveError
-        As `handeye.solving.solve`.
+        As `handeye.estimation.solve`.
     """
     recording = opened.recording
     measurements = Measurements.of_recording(recording)

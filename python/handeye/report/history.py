@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 
 from handeye.errors import HandeyeError, InputError
+from handeye.estimation import Measurements, make_estimator
 from handeye.report.document import Attempt, CurvePoint, Request, Within
 from handeye.robots import ArmKinematics, arm_kinematics, open_arm
 from handeye.session.deciding import START_VIEWS
 from handeye.session.journal import read_journal, read_settings
 from handeye.session.settings import Configuration
 from handeye.session.store import is_session
-from handeye.solving import Measurements, make_estimator
 from handeye.types import Recording
 from handeye.types.calibration import ModelName
 

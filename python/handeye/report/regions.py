@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handeye.estimation import confidence
+from handeye.estimation.confidence import PROBABILITY, radius
+from handeye.estimation.f_distribution import f_quantile
 from handeye.report.document import AtPoint, PositionAxis, RotationAxis, Within
 from handeye.report.wording import direction, figures, in_camera, turning_camera
-from handeye.solving import confidence
-from handeye.solving.confidence import PROBABILITY, radius
-from handeye.solving.f_distribution import f_quantile
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import MM_PER_M
 
@@ -61,7 +61,7 @@ def rotation_axes(
 def _axes(
     covariance: FloatArray, degrees_of_freedom: float, R_parent_camera: FloatArray
 ) -> list[tuple[float, FloatArray, FloatArray]]:
-    """Return the axes of ``rho' C^-1 rho <= 3 F(3, nu)``, as in `handeye.solving.confidence`.
+    """Return the axes of ``rho' C^-1 rho <= 3 F(3, nu)``, as in `handeye.estimation.confidence`.
 
     Each with its half length and its direction in the parent and in the camera, the longest first.
     """

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye import _core
+from handeye.estimation import Measurements, ViewPose
+from handeye.estimation.estimate import side_of_chain
 from handeye.report.document import ViewLine
-from handeye.solving import Measurements, ViewPose
-from handeye.solving.estimate import side_of_chain
 from handeye.types import Camera, Mounting, Pose, View
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import MM_PER_M, Calibration, RobotSide

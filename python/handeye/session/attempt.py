@@ -12,6 +12,8 @@ import numpy as np
 from handeye.cameras.protocol import BAD_FRAME, Frame, Grey, ImageSource, checked_frame
 from handeye.detection import Detection, NotFound, Prediction, Reason, detect
 from handeye.errors import DeviceError, HandeyeError, InputError
+from handeye.estimation import Estimate
+from handeye.estimation.measurements import MIN_POINTS
 from handeye.planning.collisions import Workspace
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
@@ -21,8 +23,6 @@ from handeye.robots.replay import is_near
 from handeye.session.calls import Calls
 from handeye.session.entry import Failure
 from handeye.session.safety import body_of, objection_to_motion
-from handeye.solving import Estimate
-from handeye.solving.measurements import MIN_POINTS
 from handeye.types import Camera, Pose, Target
 
 # Reasons that the picture itself gives: light and focus, not the place.

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from handeye.estimation import Estimate
+from handeye.estimation.estimate import answering
 from handeye.planning import Planner, PlannerOptions, Stop, StopReason
 from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import ViewLimits
@@ -20,8 +22,6 @@ from handeye.session.deciding import EndReason, Halt, Situation, Step, decision_
 from handeye.session.entry import TRANSIENT, Entry, Failure
 from handeye.session.starting import Start, starting_goal
 from handeye.session.wish import Wish
-from handeye.solving import Estimate
-from handeye.solving.estimate import answering
 from handeye.types import Camera, Pose
 
 

@@ -8,10 +8,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from handeye.estimation import Estimate, Measurements
 from handeye.planning import Proposal, Stop, StopReason
 from handeye.robots.protocol import Goal
 from handeye.session.entry import Entry
-from handeye.solving import Estimate, Measurements
 from handeye.types import View
 from handeye.types.kinematics import Kinematics
 

@@ -7,8 +7,8 @@ import numpy as np
 from handeye import _core
 from handeye.detection import Detection, Prediction, relabeled
 from handeye.errors import HandeyeError
+from handeye.estimation import Estimate, view_pose
 from handeye.robots.replay import is_near
-from handeye.solving import Estimate, view_pose
 from handeye.types import Camera, Pose, Target, View
 
 # Root mean square error of one view's own pose beyond which its points are no picture of the target.

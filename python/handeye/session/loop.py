@@ -8,6 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from handeye.errors import InputError
+from handeye.estimation import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
+from handeye.estimation.confidence import Within
+from handeye.estimation.mistakes import examine
 from handeye.session.attempt import Cell
 from handeye.session.contract import check_at_rest
 from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step
@@ -15,9 +18,6 @@ from handeye.session.entry import Entry
 from handeye.session.store import SessionStore
 from handeye.session.taking import Taker
 from handeye.session.wish import Wish
-from handeye.solving import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
-from handeye.solving.confidence import Within
-from handeye.solving.mistakes import examine
 from handeye.types import View
 from handeye.types.calibration import Calibration, ModelName
 

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handeye.estimation import Estimate
+from handeye.estimation.estimate import answering
 from handeye.planning import Planner, PlannerOptions, Pool, Stop
 from handeye.planning.prediction import Sight
 from handeye.planning.travel import Travel
@@ -11,8 +13,6 @@ from handeye.robots import Arm, ArmKinematics, arm_kinematics
 from handeye.robots.protocol import Goal
 from handeye.session.deciding import EndReason, Halt, Situation, Step, decision_of, halt_of
 from handeye.session.wish import Wish
-from handeye.solving import Estimate
-from handeye.solving.estimate import answering
 from handeye.types import View
 from handeye.types.arrays import FloatArray
 

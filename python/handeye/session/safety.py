@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handeye.estimation import Estimate
 from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import mounted_points
 from handeye.planning.solids import SolidLinks
@@ -11,7 +12,6 @@ from handeye.robots import Arm
 from handeye.robots.motion import AGREEMENT_M, AGREEMENT_RAD
 from handeye.robots.protocol import Goal
 from handeye.robots.replay import is_near
-from handeye.solving import Estimate
 from handeye.types import Pose
 
 # Rounding of degrees and radians is no faster motion.

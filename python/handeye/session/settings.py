@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from handeye.errors import InputError
+from handeye.estimation.work import Work
 from handeye.planning.collisions import Workspace
 from handeye.planning.constraints import ViewLimits
 from handeye.planning.policies import make_policy
@@ -21,7 +22,6 @@ from handeye.session.faults import FaultRates
 from handeye.session.simulated import usual_errors
 from handeye.session.starting import Start
 from handeye.session.wish import Wish
-from handeye.solving.work import Work
 from handeye.types import Mounting, Pose, View
 from handeye.types.calibration import ModelName
 from handeye.types.plain import read_document

@@ -6,12 +6,12 @@ from functools import partial
 
 from handeye.detection import Detection
 from handeye.errors import HandeyeError, OutputError, printable
+from handeye.estimation import Estimate, view_pose
 from handeye.session.attempt import Cell, Missed, Seen, attempt, encoded
 from handeye.session.deciding import Step
 from handeye.session.entry import Entry, Failure
 from handeye.session.judging import foreseen, labeled, objection, unchanged
 from handeye.session.store import SessionStore
-from handeye.solving import Estimate, view_pose
 from handeye.types import View
 
 _WRITE_PAUSE_S = 0.2

@@ -4,13 +4,13 @@ from dataclasses import dataclass, field
 
 from handeye import _core
 from handeye.errors import InputError
+from handeye.estimation import Estimate, Measurements
+from handeye.estimation.work import Work
 from handeye.planning.policies import Policy
 from handeye.planning.policies.next_best_view import NextBestView
 from handeye.planning.stopping import NumberOfViews, StopRule
 from handeye.planning.touch import TouchAccuracy, touch_criterion
 from handeye.session.request import Requested
-from handeye.solving import Estimate, Measurements
-from handeye.solving.work import Work
 from handeye.types.calibration import ModelName
 
 
@@ -78,7 +78,7 @@ class Wish:
         return Requested(self.accuracy_mm, self.accuracy_deg), number
 
     def criterion(self, estimate: Estimate, measurements: Measurements) -> _core.Criterion:
-        """Return what a view is worth now: what it takes off the touch error, if that is what is asked for."""
+        """Return what a view is worth now: what it takes off the touch error, where that is asked for."""
         if self.touch_mm is None or not estimate.determined:
             return _core.Criterion("entropy")
         return touch_criterion(estimate, measurements, self.work)

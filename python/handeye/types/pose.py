@@ -242,6 +242,11 @@ def _unrounded(matrix: FloatArray) -> FloatArray:
     return matrix
 
 
+def inverses(poses: FloatArray) -> FloatArray:
+    """(..., 4, 4) inverses of rigid transforms (..., 4, 4)."""
+    return np.asarray(np.linalg.inv(poses), dtype=np.float64)
+
+
 def through_twist(points: FloatArray, in_point: FloatArray) -> FloatArray:
     """Turn derivatives in points into derivatives in a twist that moves the points.
 

@@ -16,7 +16,7 @@ _ADVICE = {
     "hand_eye": "the hand-eye limits it most: more views, planned for the touch error, help",
     "arm": "constants of the arm limit it most: more views spread over the postures of the work help",
     "board": "the size of the board limits it most: measure the board, or touch three points of it",
-    "robot_noise": "what the arm errs by anew each time limits it most: more views do not help",
+    "robot_noise": "what the arm errs by each time limits it most: more views do not help",
 }
 
 
@@ -68,7 +68,7 @@ class TouchMap:
     tool_m
         (3,) tip of the tool in the flange.
     depth
-        Where the distance of a seen point comes from; see `handeye.solving.touch.Depth`.
+        Where the distance of a seen point comes from; see `handeye.estimation.touch.Depth`.
     points_m
         (P, 3) points of the map.
     radii_m

@@ -1,0 +1,110 @@
+"""Every statement of how far off the answer may be: radii with a probability, the ellipsoid behind them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handeye.estimation.f_distribution import f_quantile
+from handeye.types.arrays import FloatArray
+from handeye.types.calibration import MM_PER_M, Calibration
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoid:
+    """An ellipsoid around a position.
+
+    Parameters
+    ----------
+    probability
+        Probability that it holds the truth.
+    semi_axes_m
+        (3,) lengths of its semi-axes, the longest first.
+    directions
+        (3, 3) their directions in the camera frame, one a row.
+    """
+
+    probability: float
+    semi_axes_m: FloatArray
+    directions: FloatArray
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON."""
+        return {
+            "probability": self.probability,
+            "semi_axes_mm": (self.semi_axes_m * MM_PER_M).tolist(),
+            "directions": self.directions.tolist(),
+            "frame": "camera",
+        }
+
+
+PROBABILITY = 0.95
+_DRAWS = 20_000
+
+
+@dataclass(frozen=True)
+class Within:
+    """Radii within which the error of the camera's centre, and of its rotation, lies with a probability."""
+
+    translation_mm: float
+    rotation_deg: float
+
+    def to_dict(self) -> dict[str, float]:
+        """Return plain values for JSON."""
+        return {"translation_mm": self.translation_mm, "rotation_deg": self.rotation_deg}
+
+
+def within(covariance: FloatArray, degrees_of_freedom: float, probability: float = PROBABILITY) -> Within:
+    """Return how far off the answer may be: the headline of every output.
+
+    Parameters
+    ----------
+    covariance
+        (6, 6) covariance of the twist of X, whose translation is that of the camera's centre.
+    degrees_of_freedom
+        Of the noise levels behind it: where they were estimated, the error has the heavier tails of
+        Student's t.
+    """
+    return Within(
+        MM_PER_M * radius(covariance[:3, :3], degrees_of_freedom, probability),
+        float(np.rad2deg(radius(covariance[3:, 3:], degrees_of_freedom, probability))),
+    )
+
+
+def radius(covariance: FloatArray, degrees_of_freedom: float, probability: float = PROBABILITY) -> float:
+    """Return the radius within which a vector of a covariance (3, 3) lies with a probability, in its unit."""
+    return float(radii(covariance[np.newaxis], degrees_of_freedom, probability)[0])
+
+
+def radii(
+    covariances: FloatArray,
+    degrees_of_freedom: float,
+    probability: float = PROBABILITY,
+    means: FloatArray | None = None,
+) -> FloatArray:
+    """(Q,) radii within which vectors of covariances (Q, 3, 3) lie, about zero or means (Q, 3)."""
+    # A fixed sample: the same covariance has the same radius, to a hundredth.
+    random = np.random.default_rng(20)
+    draws = random.standard_normal((_DRAWS, 3))
+    if np.isfinite(degrees_of_freedom):
+        draws /= np.sqrt(random.chisquare(degrees_of_freedom, _DRAWS) / degrees_of_freedom)[:, np.newaxis]
+    variances, axes = np.linalg.eigh(covariances)
+    deviations = np.sqrt(np.clip(variances, 0, None))
+    centres = np.zeros_like(deviations) if means is None else np.einsum("qji,qj->qi", axes, means)
+    return np.array(
+        [
+            np.sqrt(np.quantile(np.square(draws * deviation + centre).sum(axis=1), probability))
+            for deviation, centre in zip(deviations, centres, strict=True)
+        ]
+    )
+
+
+def position_region(calibration: Calibration, probability: float = PROBABILITY) -> Ellipsoid:
+    """Return the ellipsoid that holds the true position of the camera with a probability.
+
+    ``rho' C^-1 rho <= 3 F(3, nu)`` over the translation part C of the covariance, nu the degrees of freedom
+    of the noise levels behind it.
+    """
+    variances, vectors = np.linalg.eigh(calibration.covariance[:3, :3])
+    scale = 3 * f_quantile(probability, 3, calibration.degrees_of_freedom)
+    lengths = np.sqrt(np.clip(variances, 0, None) * scale)
+    return Ellipsoid(probability, lengths[::-1].copy(), vectors.T[::-1].copy())

@@ -1,1 +1,0 @@
-"""How good a calibration is, and studies that compare policies, models and claims with the truth."""

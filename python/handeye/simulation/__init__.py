@@ -1,0 +1,1 @@
+"""Cells that are made up, with everything wrong at once as the world has it."""

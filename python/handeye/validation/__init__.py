@@ -1,0 +1,1 @@
+"""How far a calibration of given views holds, and how good it is where the truth is known."""
