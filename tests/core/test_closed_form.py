@@ -109,7 +109,8 @@ def rigid(R: Array, t: Array) -> Array:
 def test_methods_have_a_family_and_a_paper() -> None:
     table = _core.closed_form_methods()
     assert [name for name, family, _ in table if family == "AX = XB"] == [
-        "tsai_lenz", "park_martin", "horaud_dornaika", "andreff", "daniilidis",
+        "shiu_ahmad", "tsai_lenz", "chen", "park_martin", "horaud_dornaika", "andreff", "daniilidis",
+        "fassi_legnani", "liang_mao",
     ]  # fmt: skip
     assert [name for name, family, _ in table if family == "AX = YB"] == [
         "zhuang_roth_sudhakar", "dornaika_horaud", "li_wang_wu", "shah",
@@ -250,7 +251,7 @@ def test_wrong_pairing_is_refused() -> None:
 
 def test_unusable_arguments_are_refused() -> None:
     truth = scene(3, views=5)
-    with pytest.raises(InputError, match="tsai_lenz, park_martin"):
+    with pytest.raises(InputError, match="shiu_ahmad, tsai_lenz"):
         _core.closed_form("tsai", truth.A, truth.C)
     with pytest.raises(InputError, match="at least 3") as refused:
         _core.closed_form("shah", truth.A[:2], truth.C[:2])

@@ -139,7 +139,7 @@ def plan(
     if (criterion is Criterion.TOOL_POINT) != (tool_point_mm is not None):
         raise UsageError("--criterion tool_point and --tool-point-mm go together")
     table = None if candidates is None else read_poses(candidates, source.stated())
-    opened = (source if table is None else source.of_a_recording(folder)).open(folder)
+    opened = (source if table is None else source.of_a_recording(folder)).open(folder, arm.described())
     measurements = Measurements.of_recording(opened.recording)
     check_views(measurements)
     taken = _taken(measurements, used, first, with_file=table is not None)

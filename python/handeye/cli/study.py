@@ -36,6 +36,11 @@ study.command(
 study.command(
     "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
 )
+study.command(
+    "handeye.cli.study_methods:methods",
+    name="methods",
+    help="Compare every method on the same simulated cells.",
+)
 
 
 @Parameter(name="*", group="Study")

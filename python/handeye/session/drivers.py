@@ -7,7 +7,6 @@ A package that drives a robot declares ``[project.entry-points."handeye.robots"]
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,10 @@ from handeye.cameras.folder import WatchedFolder
 from handeye.cameras.protocol import Grey, ImageSource
 from handeye.cameras.replay import ReplayCamera
 from handeye.datasets.images import read_image
-from handeye.errors import DeviceError, InputError, printable
+from handeye.errors import DeviceError, HandeyeError, InputError, printable
+from handeye.extension import CAMERAS as CAMERA_GROUP
+from handeye.extension import ROBOTS as ROBOT_GROUP
+from handeye.extension import announced
 from handeye.importing import Opened, open_folder
 from handeye.notations import notation_of, unit_of
 from handeye.robots import Arm
@@ -27,7 +29,6 @@ from handeye.session.calls import MAX_MESSAGE
 from handeye.types import View
 
 REPLAY, MANUAL = "replay", "manual"
-ROBOT_GROUP, CAMERA_GROUP = "handeye.robots", "handeye.cameras"
 ROBOTS = ("simulated", MANUAL, REPLAY)
 CAMERAS = ("simulated", "folder", "opencv", REPLAY)
 
@@ -105,10 +106,10 @@ def replayed_camera(opened: Opened, robot: ReplayRobot) -> ReplayCamera:
 
 
 def _announced(group: str, name: str, address: str, own: tuple[str, ...], kind: type[Any]) -> Any:  # noqa: ANN401
-    found = {point.name: point for point in entry_points(group=group)}
+    found = announced(group)
     if name not in found:
         raise InputError(
-            f"no driver {name[:60]!r}, expected one of {', '.join([*own, *sorted(found)])}",
+            f"no driver {name[:60]!r}, expected one of {', '.join([*own, *found])}",
             code="unknown_driver",
             hint=f"a package with a driver announces it in the entry point group {group}",
         )
@@ -116,6 +117,13 @@ def _announced(group: str, name: str, address: str, own: tuple[str, ...], kind: 
         driver = found[name].load()(address)
     except KeyboardInterrupt:
         raise
+    except HandeyeError as error:
+        kind_of_error = InputError if isinstance(error, InputError) else DeviceError
+        raise kind_of_error(
+            printable(f"driver {name}: {error.message}", MAX_MESSAGE),
+            code=printable(error.code, 60),
+            hint=None if error.hint is None else printable(error.hint, MAX_MESSAGE),
+        ) from error
     except BaseException as error:
         message = printable(f"{type(error).__name__}: {str(error)[:MAX_MESSAGE]}", MAX_MESSAGE)
         raise DeviceError(f"driver {name}: {message}", code="driver_failed") from error

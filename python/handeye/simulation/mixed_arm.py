@@ -56,7 +56,7 @@ class MixedArm:
                 "pose_m": (0.005e-3, 0.1e-3),
                 "pose_deg": (0.0005, 0.01),
             }
-            levels = {name: level(random, range_) for name, range_ in bounds.items()}
+            levels = {name: log_uniform(random, range_) for name, range_ in bounds.items()}
         levels = {name: factor * value for name, value in levels.items()}
         offsets = float(np.deg2rad(levels["offset_deg"])) * random.standard_normal(len(arm))
         offsets[[0, -1]] = 0.0
@@ -70,18 +70,20 @@ class MixedArm:
         noise = float(np.deg2rad(levels["encoder_deg"])) * random.standard_normal(joints.shape)
         play = 0.5 * float(np.deg2rad(levels["play_deg"])) * np.sign(random.standard_normal(joints.shape))
         both = [
-            _core.se3_exp(np.array([twist(random, levels["pose_m"], levels["pose_deg"]) for _ in joints]))
+            _core.se3_exp(
+                np.array([random_twist(random, levels["pose_m"], levels["pose_deg"]) for _ in joints])
+            )
             for _ in range(2)
         ]
         return both[0] @ self.built.forward(joints + self.offsets_rad + noise - play) @ both[1]
 
 
-def level(random: np.random.Generator, bounds: tuple[float, float]) -> float:
-    """Draw a level, log-uniform between bounds."""
+def log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> float:
+    """Draw a level between two bounds, evenly in its logarithm."""
     low, high = bounds
     return low * (high / low) ** random.uniform()
 
 
-def twist(random: np.random.Generator, metres: float, degrees: float) -> FloatArray:
+def random_twist(random: np.random.Generator, metres: float, degrees: float) -> FloatArray:
     """Draw a twist (6,) with these deviations per axis."""
     return np.concatenate([random.normal(0, metres, 3), random.normal(0, np.deg2rad(degrees), 3)])

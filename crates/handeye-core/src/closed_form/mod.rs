@@ -16,19 +16,24 @@
 
 mod andreff;
 pub mod automatic;
+mod chen;
 mod daniilidis;
 pub mod degeneracy;
 mod dornaika_horaud;
 mod estimate;
+mod fassi_legnani;
 mod horaud_dornaika;
 mod li_wang_wu;
+mod liang_mao;
 mod linear;
 mod mean;
 mod motion;
 mod park_martin;
 mod quaternion;
 mod rotation_fit;
+mod screw;
 mod shah;
+mod shiu_ahmad;
 #[cfg(test)]
 mod tests;
 mod translation;
@@ -67,8 +72,12 @@ impl Family {
 /// A closed-form method; each has its own file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Method {
+    /// Shiu and Ahmad 1989.
+    ShiuAhmad,
     /// Tsai and Lenz 1989.
     TsaiLenz,
+    /// Chen 1991, screw axes.
+    Chen,
     /// Park and Martin 1994.
     ParkMartin,
     /// Horaud and Dornaika 1995, closed-form quaternion solution.
@@ -77,6 +86,10 @@ pub enum Method {
     Andreff,
     /// Daniilidis 1999.
     Daniilidis,
+    /// Fassi and Legnani 2005, screw axes and their common normals.
+    FassiLegnani,
+    /// Liang and Mao 2008, Kronecker solution.
+    LiangMao,
     /// Zhuang, Roth and Sudhakar 1994.
     ZhuangRothSudhakar,
     /// Dornaika and Horaud 1998, closed-form solution.
@@ -103,12 +116,16 @@ struct Entry {
 
 impl Method {
     /// Every method, the `AX = XB` family first, each family by year.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 13] = [
+        Self::ShiuAhmad,
         Self::TsaiLenz,
+        Self::Chen,
         Self::ParkMartin,
         Self::HoraudDornaika,
         Self::Andreff,
         Self::Daniilidis,
+        Self::FassiLegnani,
+        Self::LiangMao,
         Self::ZhuangRothSudhakar,
         Self::DornaikaHoraud,
         Self::LiWangWu,
@@ -117,13 +134,19 @@ impl Method {
 
     fn entry(self) -> Entry {
         let (name, paper, solver) = match self {
+            Self::ShiuAhmad => ("shiu_ahmad", shiu_ahmad::PAPER, Solver::Motions(shiu_ahmad::solve)),
             Self::TsaiLenz => ("tsai_lenz", tsai_lenz::PAPER, Solver::Motions(tsai_lenz::solve)),
+            Self::Chen => ("chen", chen::PAPER, Solver::Motions(chen::solve)),
             Self::ParkMartin => ("park_martin", park_martin::PAPER, Solver::Motions(park_martin::solve)),
             Self::HoraudDornaika => {
                 ("horaud_dornaika", horaud_dornaika::PAPER, Solver::Motions(horaud_dornaika::solve))
             }
             Self::Andreff => ("andreff", andreff::PAPER, Solver::Motions(andreff::solve)),
             Self::Daniilidis => ("daniilidis", daniilidis::PAPER, Solver::Motions(daniilidis::solve)),
+            Self::FassiLegnani => {
+                ("fassi_legnani", fassi_legnani::PAPER, Solver::Motions(fassi_legnani::solve))
+            }
+            Self::LiangMao => ("liang_mao", liang_mao::PAPER, Solver::Motions(liang_mao::solve)),
             Self::ZhuangRothSudhakar => (
                 "zhuang_roth_sudhakar",
                 zhuang_roth_sudhakar::PAPER,

@@ -1,6 +1,8 @@
 """Which candidate to take next: one file per policy."""
 
 from handeye.errors import InputError
+from handeye.extension import POLICIES as GROUP
+from handeye.extension import announced
 from handeye.planning.policies.base import Choice, Policy, Situation
 from handeye.planning.policies.gain_per_second import GainPerSecond
 from handeye.planning.policies.max_distance import MaxDistance
@@ -25,14 +27,24 @@ __all__ = [
 
 
 def make_policy(name: str) -> Policy:
-    """Return the policy of a name.
+    """Return the policy of a name: one of ours, or one that a package announces in `handeye.policies`.
 
     Raises
     ------
     InputError
-        No such policy.
+        No such policy, or what is announced cannot be loaded or is none.
     """
     policy = POLICIES.get(name)
-    if policy is None:
-        raise InputError(f"policy {name!r}, expected one of {', '.join(POLICIES)}", code="unknown_policy")
-    return policy()
+    if policy is not None:
+        return policy()
+    others = announced(GROUP)
+    if name not in others:
+        known = ", ".join([*POLICIES, *others])
+        raise InputError(f"policy {name!r}, expected one of {known}", code="unknown_policy")
+    try:
+        found = others[name].load()()
+    except Exception as error:
+        raise InputError(f"policy {name}: {type(error).__name__}: {error}", code="unknown_policy") from error
+    if not isinstance(found, Policy):
+        raise InputError(f"policy {name}: {type(found).__name__} is no Policy", code="unknown_policy")
+    return found

@@ -42,8 +42,8 @@ fn automatic_choice_ranks_by_cost_and_keeps_failures() {
     assert!(ranking.candidates.windows(2).all(|pair| pair[0].cost <= pair[1].cost));
     let best = ranking.best();
     assert_eq!(best.cost, misfit(&best.x, &best.y));
-    assert_eq!(ranking.distinct(9, 10.0, 4.0).len(), 1);
-    assert_eq!(ranking.distinct(9, 0.0, 0.0).len(), ranking.candidates.len());
+    assert_eq!(ranking.distinct(Method::ALL.len(), 10.0, 4.0).len(), 1);
+    assert_eq!(ranking.distinct(Method::ALL.len(), 0.0, 0.0).len(), ranking.candidates.len());
     assert_eq!(ranking.distinct(2, 0.0, 0.0), [&ranking.candidates[0], &ranking.candidates[1]]);
 
     assert!(rank(&scene.a, &scene.c, |_, _| Err(Error::numerical("never"))).is_err());

@@ -1,0 +1,44 @@
+"""What other packages bring: members of a family by entry point, and libraries that only one member needs."""
+
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from handeye.errors import DeviceError
+
+ROBOTS, CAMERAS, POLICIES = "handeye.robots", "handeye.cameras", "handeye.policies"
+
+
+def announced(group: str) -> dict[str, EntryPoint]:
+    """Return the members that installed packages announce in a group, by name in alphabetical order."""
+    return {point.name: point for point in sorted(entry_points(group=group), key=lambda point: point.name)}
+
+
+def library(module: str, extra: str) -> Any:  # noqa: ANN401 - a module without types
+    """Return the library of a device, imported now.
+
+    Parameters
+    ----------
+    module
+        Name of its module.
+    extra
+        The extra of this package that installs it.
+
+    Raises
+    ------
+    DeviceError
+        It is not installed or cannot be loaded; `code` is `library_missing`.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        absent = (
+            isinstance(error, ModuleNotFoundError)
+            and (error.name or "").partition(".")[0] == (module.partition(".")[0])
+        )
+        found = "is not installed" if absent else f"cannot be loaded: {error}"
+        raise DeviceError(
+            f"the library {module} {found}",
+            code="library_missing",
+            hint=f"pip install 'handeye[{extra}]'",
+        ) from error
