@@ -11,7 +11,15 @@ from handeye.planning.prediction import Sight
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics, arm_kinematics
 from handeye.robots.protocol import Goal
-from handeye.session.deciding import EndReason, Halt, Situation, Step, decision_of, halt_of
+from handeye.session.deciding import (
+    Considered,
+    EndReason,
+    Halt,
+    Situation,
+    Step,
+    decision_of,
+    halt_of,
+)
 from handeye.session.wish import Wish
 from handeye.types import View
 from handeye.types.arrays import FloatArray
@@ -80,7 +88,10 @@ class RecordedChooser:
                 return halt
             return Halt(halt.reason, f"none of the {len(self._views)} recorded views is left")
         view = next(view for view in left if view.name == answer.candidate.name)
-        return Step(self._goal(view), "plan", decision_of(answer, estimate, {}), estimate)
+        considered = Considered(planner.pool, planner.gains())
+        return Step(
+            self._goal(view), "plan", decision_of(answer, estimate, {}), estimate, considered=considered
+        )
 
     def _goal(self, view: View) -> Goal:
         return Goal(f"{view.name}.1", view.T_base_flange, view.joints_rad, self._wish.speed_rad_s)
