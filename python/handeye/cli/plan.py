@@ -138,7 +138,7 @@ def plan(
     warnings = (*opened.warnings, *(() if table is None else table.warnings))
     with mindful_of(warnings):
         start = measurements.select([names.index(name) for name in taken])
-        kinematics = arm.kinematics(opened.recording, model)
+        kinematics = arm.kinematics(opened.recording.views, model)
         estimator = make_estimator(model, kinematics)
         planner = Planner(start, pool, estimator, options)
         ranking = rank(planner.estimate, planner.pool, worth, sight, gains=planner.gains(), top=top)
