@@ -160,7 +160,7 @@ def plan(
     warnings = (*opened.warnings, *(() if table is None else table.warnings))
     with mindful_of(warnings):
         start = measurements.select([names.index(name) for name in taken])
-        kinematics = arm.kinematics(opened.recording, model)
+        kinematics = arm.kinematics(opened.recording.views, model)
         estimate = make_estimator(model, kinematics)(start)
         here = work.work()
         known = touch_where_possible(estimate, start, here)

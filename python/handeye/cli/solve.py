@@ -8,10 +8,12 @@ import numpy as np
 
 from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
+from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.page import Page, serve, show_views
 from handeye.cli.solve_poses import answer_for_poses
+from handeye.cli.solve_rig import answer_for_rig
 from handeye.cli.source import Source, mindful_of
 from handeye.cli.work import WorkOptions, touch_lines
 from handeye.datasets import PosePairs
@@ -20,7 +22,7 @@ from handeye.estimation import solve as solve_recording
 from handeye.estimation.certificate import Certificate, certify_calibration
 from handeye.estimation.confidence import Ellipsoid, position_region, within
 from handeye.estimation.mistakes import examine
-from handeye.importing import Opened
+from handeye.importing import Opened, is_rig
 from handeye.robots import ArmKinematics
 from handeye.types.calibration import Calibration, JointOffset, ModelName, RobotSide
 
@@ -53,7 +55,8 @@ def solve(
     Parameters
     ----------
     folder
-        Folder with the views, or a file of samples of easy_handeye2 or MoveIt.
+        Folder with the views or with a folder for each camera, or a file of samples of easy_handeye2 or
+        MoveIt.
     model
         auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
     reduced
@@ -66,11 +69,24 @@ def solve(
         Also write the JSON object to this file.
     """
     check_output(output)
+    if is_rig(folder):
+        if certify or page.ui:
+            raise UsageError("--certify and --ui take one camera", hint="leave them out for several")
+        rig = source.open_rig(folder)
+        views = [station.views[0].view for station in rig.recording.stations]
+        return answer_for_rig(
+            rig,
+            model,
+            output,
+            reduced=reduced,
+            kinematics=arm.kinematics(views, model),
+            camera_fixed=camera_fixed,
+        )
     opened = source.open_any(folder, arm.described())
     if isinstance(opened, PosePairs):
         return answer_for_poses(opened, output)
     with mindful_of(opened.warnings):
-        kinematics = arm.kinematics(opened.recording, model)
+        kinematics = arm.kinematics(opened.recording.views, model)
         calibration = solve_recording(
             opened.recording,
             model,
