@@ -1,7 +1,7 @@
 """The cell that follows from what was asked for: its drivers, where its arm stands, and its session."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,85 +16,20 @@ from handeye.robots import Arm, open_arm, shipped_arms
 from handeye.robots.protocol import Goal
 from handeye.robots.replay import ReplayRobot
 from handeye.robots.shapes import read_shapes
-from handeye.robots.simulated import SimulatedArm
 from handeye.session.attempt import Cell
 from handeye.session.calls import Calls
-from handeye.session.choosing import ArmChooser
-from handeye.session.deciding import Chooser
 from handeye.session.drivers import REPLAY, Person, open_camera, open_robot, replayed_camera
-from handeye.session.entry import Entry
-from handeye.session.loop import Progress, Session
-from handeye.session.recorded import RecordedChooser
+from handeye.session.entry import Entry, views_of
+from handeye.session.loop import Session
+from handeye.session.observer import Observer
+from handeye.session.prepared import Prepared
 from handeye.session.safety import body_of
 from handeye.session.self_calibration import SelfCalibration, nominal_camera
 from handeye.session.settings import Collisions, Configuration, check_fingerprints, fingerprints, read_start
 from handeye.session.simulated import SimulationOptions, simulated_cell
 from handeye.session.starting import Start
 from handeye.session.store import SessionStore, create_session, open_session
-from handeye.types import Camera, Mounting, Recording, Target, Truth, View
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """A run, ready to begin.
-
-    Parameters
-    ----------
-    cell
-        The world.
-    start
-        Where the arm stands; None in a replay, which begins with any view.
-    recording
-        What its views will be written into.
-    truth
-        What is true, where that is known.
-    hidden_arm
-        The arm as it is, if it is simulated.
-    recorded
-        The views that a replay goes through.
-    true_camera
-        The camera as it is, if it is simulated.
-    """
-
-    configuration: Configuration
-    cell: Cell
-    start: Start | None
-    recording: Recording
-    truth: Truth | None = None
-    hidden_arm: SimulatedArm | None = None
-    recorded: tuple[View, ...] | None = None
-    true_camera: Camera | None = None
-
-    @property
-    def arm(self) -> Arm:
-        """The arm.
-
-        Raises
-        ------
-        InputError
-            A replay of an arm that is not known.
-        """
-        if self.cell.arm is None:
-            raise InputError(
-                "the arm is not known", code="missing_value", hint="name it with its description"
-            )
-        return self.cell.arm
-
-    def chooser(self) -> Chooser:
-        """Return what decides where to go.
-
-        Raises
-        ------
-        InputError
-            Recorded poses that are not those of the arm.
-        """
-        cell, wish = self.cell, self.configuration.wish()
-        if self.recorded is not None:
-            return RecordedChooser(self.recorded, wish, cell.arm)
-        if cell.workspace is None or self.start is None:
-            raise InputError("a workspace and where the arm stands are needed", code="missing_value")
-        limits = self.configuration.limits
-        return ArmChooser(self.arm, cell.workspace, cell.camera, self.start, wish, limits, cell.solids)
+from handeye.types import Camera, Mounting, Recording, Target
 
 
 def prepare(
@@ -105,6 +40,7 @@ def prepare(
     person: Person | None = None,
     confirm: Callable[[Goal], bool] | None = None,
     start: Start | None = None,
+    observer: Observer | None = None,
 ) -> Prepared:
     """Open the drivers and see where the arm stands; nothing moves.
 
@@ -117,6 +53,8 @@ def prepare(
         Asked by the drivers that need a person.
     start
         Where the arm stood when the session began, on going on; None to ask the robot.
+    observer
+        Told of what happens.
 
     Raises
     ------
@@ -126,8 +64,9 @@ def prepare(
         A driver fails.
     """
     configuration.wish()  # refused now rather than once the arm has moved
+    observer = observer or Observer()
     if configuration.is_replay:
-        return _replayed(configuration, camera, confirm)
+        return _replayed(configuration, camera, confirm, observer)
     if configuration.robot is None:
         raise InputError(
             "no arm is named",
@@ -140,7 +79,7 @@ def prepare(
         configuration, collisions=Collisions.CAPSULES if solids is None else Collisions.MESHES
     )
     if configuration.is_simulated:
-        return _simulated(configuration, arm, target, confirm, solids)
+        return _simulated(configuration, arm, target, confirm, solids, observer)
     if target is None:
         raise InputError(
             "a real cell needs a target", code="missing_value", hint="name its file with --target"
@@ -164,6 +103,7 @@ def prepare(
         solids,
         configuration.speed_rad_s,
         by_hand=configuration.by_hand,
+        observer=observer,
     )
     if start is None:
         start = _standing(cell, arm)
@@ -171,7 +111,7 @@ def prepare(
     return Prepared(configuration, cell, start, recording)
 
 
-def begin(prepared: Prepared, folder: Any, progress: Progress | None = None) -> tuple[Session, SessionStore]:  # noqa: ANN401
+def begin(prepared: Prepared, folder: Any) -> tuple[Session, SessionStore]:  # noqa: ANN401
     """Make the folder of a session and the session.
 
     Raises
@@ -192,17 +132,17 @@ def begin(prepared: Prepared, folder: Any, progress: Progress | None = None) -> 
     if not prepared.configuration.camera_known:
         cell, lens = prepared.cell, prepared.configuration.lens
         settings |= SelfCalibration(cell.target, cell.camera.size_px, lens).setting()
-    chooser = prepared.chooser()
+    prepared.chooser()  # refused before anything is written
     store = create_session(folder, prepared.recording, settings)
-    return Session(prepared.cell, store, chooser, prepared.configuration.wish(), progress), store
+    return prepared.session(store), store
 
 
 def go_on(
     folder: Any,  # noqa: ANN401 - a path
-    progress: Progress | None = None,
     *,
     person: Person | None = None,
     confirm: Callable[[Goal], bool] | None = None,
+    observer: Observer | None = None,
 ) -> tuple[Session, SessionStore, Prepared]:
     """Open a session that was broken off, or has ended, with the same settings.
 
@@ -216,7 +156,7 @@ def go_on(
     store = open_session(folder)
     try:
         configuration = Configuration.from_dict(store.settings.get("configuration"))
-        begun = any(entry.view is not None for entry in store.entries) or configuration.is_simulated
+        begun = bool(views_of(store.entries)) or configuration.is_simulated
         # Before the first view the arm may be driven elsewhere, and begins from there.
         start = read_start(store.settings) if begun and not configuration.is_replay else None
         recording = store.begun_with
@@ -227,11 +167,12 @@ def go_on(
             person=person,
             confirm=confirm,
             start=start,
+            observer=observer,
         )
         check_fingerprints(store.settings, fingerprints(prepared.cell.arm, prepared.recorded))
         if prepared.hidden_arm is not None and start is not None:
             prepared.hidden_arm.place(_left_at(store.entries) or start.joints_rad)
-        session = Session(prepared.cell, store, prepared.chooser(), configuration.wish(), progress)
+        session = prepared.session(store)
     except BaseException:
         store.close()
         raise
@@ -303,6 +244,7 @@ def _replayed(
     configuration: Configuration,
     camera: Camera | None,
     confirm: Callable[[Goal], bool] | None,
+    observer: Observer,
 ) -> Prepared:
     if configuration.images.partition(":")[0] != REPLAY:
         raise InputError("a replayed robot needs the replayed camera", code="unknown_driver")
@@ -320,6 +262,7 @@ def _replayed(
         source.target,
         configuration.patience,
         confirm,
+        observer=observer,
     )
     recording = Recording(
         f"replay of {source.name}", source.mounting, source.camera, source.target, (), None, source.source
@@ -357,6 +300,7 @@ def _simulated(
     target: Target | None,
     confirm: Callable[[Goal], bool] | None,
     solids: SolidLinks | None,
+    observer: Observer,
 ) -> Prepared:
     wrong = configuration.simulation
     look = Appearance(blur_px=wrong.blur_px, noise=wrong.pixel_noise)
@@ -383,6 +327,7 @@ def _simulated(
         confirm=confirm,
         solids=solids,
         speed_rad_s=configuration.speed_rad_s,
+        observer=observer,
     )
     recording = made.recording
     if not configuration.camera_known:

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from handeye.errors import InputError
+from handeye.estimation.work import Work
 from handeye.planning.collisions import Workspace
 from handeye.planning.constraints import ViewLimits
 from handeye.planning.policies import make_policy
@@ -71,6 +72,8 @@ class Configuration:
         Of a camera that is not; None to have the views choose.
     accuracy_px
         How well such a camera is to be known, see `Wish`.
+    touch_mm, work
+        Touch error to reach in place of the accuracy, and what is seen and touched.
     """
 
     robot: str | None
@@ -96,6 +99,8 @@ class Configuration:
     lens: str | None = None
     accuracy_px: float = 1.0
     simulation: Simulation = field(default_factory=Simulation)
+    touch_mm: float | None = None
+    work: Work = field(default_factory=Work)
 
     @property
     def is_simulated(self) -> bool:
@@ -126,6 +131,8 @@ class Configuration:
             refine=self.refine,
             policy=make_policy(self.policy),
             accuracy_px=None if self.camera_known else self.accuracy_px,
+            touch_mm=self.touch_mm,
+            work=self.work,
         )
 
     def workspace(self) -> Workspace:
