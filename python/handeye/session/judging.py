@@ -8,7 +8,7 @@ import numpy as np
 from handeye import _core
 from handeye.detection import Detection, Prediction, relabeled
 from handeye.errors import HandeyeError
-from handeye.estimation import Estimate, view_pose
+from handeye.estimation import Estimate, Measurements, view_pose
 from handeye.robots.replay import is_near
 from handeye.types import Camera, Pose, Target, View
 from handeye.types.arrays import FloatArray
@@ -24,6 +24,10 @@ SIGMAS = 6.0
 FEWEST_WITNESSES = 4
 # The arm's own errors are not all known: a prediction is never taken to be better than this.
 LEAST_MARGIN_PX = 8.0
+# Views agree where none is farther off what is believed than the first, nor so many times as far as the
+# median, which is not taken to be less than the second: metres, radians.
+AGREEMENT = ((0.003, 1e-4), (np.deg2rad(0.5), np.deg2rad(0.02)))
+STANDS_OUT = 4.0
 # Points that all moved less than this did not move, though the arm moved more than this: metres, radians.
 UNCHANGED_PX = 0.5
 ELSEWHERE = (0.005, np.deg2rad(1.0))
@@ -100,6 +104,26 @@ def _no_plane(target: Target, view: View) -> str | None:
     if not rms <= LARGEST_BEND * extent:
         return f"its points are {rms:.0f} px from any picture of a flat target"
     return None
+
+
+def all_agree(measurements: Measurements, estimate: Estimate) -> bool:
+    """Tell whether every view is where the estimate has it, and none stands out: then none is a mistake.
+
+    A wrong view shows even where it has drawn the estimate to it: it then lies several times farther off than
+    the median, or all of them are far off.
+    """
+    predicted = estimate.X.matrix @ measurements.motions @ estimate.Y.matrix
+    seen = measurements.camera_poses
+    middle = measurements.target.points.mean(axis=0)
+    off_m = np.linalg.norm(
+        (predicted[:, :3, :3] - seen[:, :3, :3]) @ middle + predicted[:, :3, 3] - seen[:, :3, 3], axis=1
+    )
+    turns = np.einsum("kji,kjl->kil", predicted[:, :3, :3], seen[:, :3, :3])
+    off_rad = np.linalg.norm(turns - np.eye(3), axis=(1, 2)) / np.sqrt(2.0)
+    return all(
+        off.max() <= limit and off.max() <= STANDS_OUT * max(float(np.median(off)), floor)
+        for off, limit, floor in ((off_m, *AGREEMENT[0]), (off_rad, *AGREEMENT[1]))
+    )
 
 
 def unchanged(view: View, others: Sequence[View]) -> bool:

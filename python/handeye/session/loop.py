@@ -16,6 +16,7 @@ from handeye.session.attempt import Cell
 from handeye.session.contract import check_at_rest
 from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step
 from handeye.session.entry import Entry, Failure, views_of
+from handeye.session.judging import all_agree
 from handeye.session.store import SessionStore
 from handeye.session.taking import Taker
 from handeye.session.wish import Wish
@@ -109,10 +110,9 @@ class Session:
                 "the arm may still move",
             )
         views = self._usable()
-        measurements = self._planned_from(views)
+        measurements, estimate = self._planned_from(views)
         if len(measurements) < len(views) and len(views) >= self._wish.most_views:
             return self._end(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
-        estimate = self._estimator(measurements) if len(measurements) >= START_VIEWS else None
         attempts = tuple(entry for entry in self._store.entries if entry.withdraws is None)
         answer = self._choose(Situation(attempts, tuple(views), measurements, estimate))
         if isinstance(answer, Step):
@@ -212,15 +212,23 @@ class Session:
         self._measurements = self._measurements.with_views(view for view in views if view.name not in known)
         return self._measurements
 
-    def _planned_from(self, views: list[View]) -> Measurements:
-        """Return what to plan from: one wrong view would make all the others look uncertain."""
+    def _planned_from(self, views: list[View]) -> tuple[Measurements, Estimate | None]:
+        """Return what to plan from: one wrong view would make all the others look uncertain.
+
+        Mistakes are looked for only where a view stands out: where all agree there are none to be found, and
+        the end of the session looks for them in any case.
+        """
         measurements = self._with(views)
-        if len(measurements) < FEWEST_EXAMINED:
-            return measurements
+        if len(measurements) < START_VIEWS:
+            return measurements, None
+        estimate = self._estimator(measurements)
+        if len(measurements) < FEWEST_EXAMINED or all_agree(measurements, estimate):
+            return measurements, estimate
         try:
-            return self._examined(measurements).measurements
+            measurements = self._examined(measurements).measurements
         except InputError:
-            return measurements  # Shared by all of them; said at the end.
+            return measurements, estimate  # Shared by all of them; said at the end.
+        return measurements, self._estimator(measurements) if len(measurements) >= START_VIEWS else None
 
     def _examined(self, measurements: Measurements) -> Examination:
         """Look for mistakes; a camera that the views teach is found again without those that are wrong."""
