@@ -10,7 +10,7 @@ import pytest
 from cells import Cell
 from handeye.cameras.protocol import Frame, Points
 from handeye.errors import DeviceError, InputError
-from handeye.estimation import Estimate
+from handeye.estimation import Estimate, Measurements
 from handeye.estimation.lens_confidence import lens_difference_px
 from handeye.planning import Stop
 from handeye.planning.stopping import State
@@ -124,8 +124,10 @@ def test_a_wrong_view_does_not_spoil_the_camera() -> None:
 
 
 def test_the_lens_is_part_of_the_request(estimate_of_unknown: Estimate) -> None:
-    gains = np.ones(1)
-    state = State(9, estimate_of_unknown, gains)
+    cell = Cell(np.random.default_rng(4))
+    views = cell.views([cell.robot_pose(cell.look()) for _ in range(6)], sigma_px=0.1)
+    measurements = Measurements.of(cell.mounting, cell.camera, cell.target, views)
+    state = State(measurements, estimate_of_unknown, np.ones(1))
     assert isinstance(Requested(500, 50, 1e4).verdict(state), Stop)
     assert Requested(500, 50, 1e-4).verdict(state) is None
     with pytest.raises(InputError):

@@ -26,8 +26,8 @@ FEWEST_WITNESSES = 4
 LEAST_MARGIN_PX = 8.0
 # Views agree where none is farther off what is believed than the first, nor so many times as far as the
 # median, which is not taken to be less than the second: metres, radians.
-AGREEMENT = ((0.003, 1e-4), (np.deg2rad(0.5), np.deg2rad(0.02)))
-STANDS_OUT = 4.0
+AGREEMENT = ((0.0015, 1e-4), (np.deg2rad(0.3), np.deg2rad(0.02)))
+STANDS_OUT = 3.0
 # Points that all moved less than this did not move, though the arm moved more than this: metres, radians.
 UNCHANGED_PX = 0.5
 ELSEWHERE = (0.005, np.deg2rad(1.0))
