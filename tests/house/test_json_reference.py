@@ -92,7 +92,7 @@ def test_solve(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     compare(
         "handeye solve",
         handeye.json("solve", shipped),
-        handeye.json("solve", shipped, "--model", "paper"),
+        handeye.json("solve", shipped, "--model", "paper", "--certify"),
         handeye.json("solve", open_directions, "--reduced"),
         handeye.json("solve", of_arm, "--robot", "ur5e"),
         handeye.json("solve", bag, "--target", tmp_path / "board.json", "--reduced"),
@@ -195,6 +195,10 @@ def test_twin(handeye: Handeye) -> None:
 def test_simulated_studies(handeye: Handeye) -> None:
     data = handeye.json("study", "methods", "--trials", "1", "--workers", "1")
     compare("handeye study methods", data)
+    few = ("--trials", "1", "--workers", "1")
+    compare("handeye study policies", handeye.json("study", "policies", "--budgets", "5", *few))
+    one_step = ("--candidates", "3", "--draws", "2", "--arm", "exact")
+    compare("handeye study gains", handeye.json("study", "gains", *one_step, *few))
     data = handeye.json("study", "coverage", "--trials", "1", "--workers", "1")
     compare("handeye study coverage", data)
 

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
 from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, read_target
-from handeye.datasets.recording_format import FILE_NAME
+from handeye.datasets.recording_header import FILE_NAME
 from handeye.errors import HandeyeError
 from handeye.importing import BagOptions, Opened, SourceOptions, open_any, open_folder
 from handeye.notations import Direction, Unit, notation_of

@@ -38,6 +38,16 @@ study.command(
     name="methods",
     help="Compare every method on the same simulated cells.",
 )
+study.command(
+    "handeye.cli.study_policies:policies",
+    name="policies",
+    help="Compare policies in the same cells at equal budget.",
+)
+study.command(
+    "handeye.cli.study_policies:gains",
+    name="gains",
+    help="Tell what gains are worth, apart from noise.",
+)
 
 
 @Parameter(name="*", group="Study")
