@@ -24,8 +24,8 @@ SIGMA_RAD = np.deg2rad(0.1)
 # No detector is better than this; all else is found.
 LEAST_M, LEAST_RAD = 1e-6, np.deg2rad(1e-4)
 # A sample is left out if it is this many times further off than the middle one; so many stay at least.
-FAR_OUT, STAYING = 8.0, 6
-DRAWS, REFITS = 40, 3
+FAR_OUT, STAYING = 8.0, 5
+DRAWS, REFITS = 60, 3
 NODE_PAIRS, MOST_LINEARISATIONS = 16, 8
 
 
@@ -104,7 +104,8 @@ def solve_poses(pairs: PosePairs) -> PosesSolved:
             f"{pairs.name}: {len(pairs)} samples, at least {MIN_VIEWS} are needed", code="too_few_views"
         )
     motions, seen = pairs.motions, pairs.camera_poses
-    x, y = first_fit(motions, seen)
+    kept = _agreeing(motions, seen, *first_fit(motions, seen))
+    x, y = first_fit(motions[kept], seen[kept])
     angles, distances = chain_errors(x @ motions @ y, seen)
     if np.median(angles) > FITS_RAD or np.median(distances) > FITS_M:
         raise SolveError(
@@ -114,8 +115,6 @@ def solve_poses(pairs: PosePairs) -> PosesSolved:
             code="inconsistent",
             hint="are both in metres, in the same order, and the poses of the target those in the camera?",
         )
-    kept = _agreeing(motions, seen, x, y)
-    x, y = first_fit(motions[kept], seen[kept])
     posterior = _posterior(pairs, kept, x, y)
     X, Y = Pose(posterior.x[0]), Pose(posterior.y[0])
     angles, distances = chain_errors(X.matrix @ motions @ Y.matrix, seen)
