@@ -414,6 +414,13 @@ class PoseMeasurements:
         free_camera: list[int] | None = None,
         board_scale: bool = False,
     ) -> None: ...
+    @staticmethod
+    def stated(motions: ArrayLike, poses: ArrayLike, covariances: ArrayLike) -> PoseMeasurements:
+        """Poses (K, 4, 4) that somebody else's detector states.
+
+        With the covariance (K, 6, 6) of their left perturbation, and the middle (K, 4, 4) of each chain.
+        """
+
     def __len__(self) -> int: ...
     @property
     def variances_px2(self) -> list[float]: ...
