@@ -4,6 +4,7 @@ use handeye_core::estimation::{Agreement as CoreAgreement, Cell, Measurement, St
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
+use crate::call::CallCore;
 use crate::convert::{self, Array, Indices};
 use crate::errors::{invalid, to_python};
 use crate::estimation::{CameraGiven, PoseMeasurements, body, seen_by};
@@ -102,7 +103,7 @@ impl Agreement {
         pairs: usize,
     ) -> PyResult<Fitted<'py>> {
         let fit = py
-            .detach(|| self.inner.fit(&members.0, levels.as_deref(), pairs))
+            .core(|| self.inner.fit(&members.0, levels.as_deref(), pairs))?
             .map_err(|e| to_python(py, e))?;
         let count = fit.predictions.len();
         let deviations = fit.predictions.iter().flat_map(|p| p.deviation.iter().copied()).collect();

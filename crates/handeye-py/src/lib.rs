@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 
 mod agreement;
 mod alignment;
+mod call;
 mod camera;
 mod closed_form;
 mod convert;

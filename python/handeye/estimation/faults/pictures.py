@@ -44,9 +44,9 @@ def examine_pictures(measurements: Measurements, *, closely: bool = False) -> tu
         The camera is not that of the pictures, or they are sheared.
     """
     before = median_px(measurements)
-    if before < (0.2 * HEALTHY_PX if closely else HEALTHY_PX) or measurements.camera.from_views:
+    if before < (0.2 * HEALTHY_PX if closely else HEALTHY_PX):
         return ()
-    found = recalibrated(measurements)
+    found = None if measurements.camera.from_views else recalibrated(measurements)
     after = before if found is None else found.after_px
     if after > HEALTHY_PX:  # No camera explains them.
         shear, left = sheared_pictures.find_shear(measurements)
