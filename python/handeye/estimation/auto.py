@@ -93,6 +93,10 @@ class AutoEstimator:
             measurements.camera_poses,
             free_camera=list(prior.free) or None,
             board_scale=True,
+            sigmas_px=[
+                None if view.sigmas_px is None else np.hypot(view.sigmas_px, LEAST_PIXEL_SIGMA)
+                for view in measurements.views
+            ],
         )
         variances = seen.shrunk_variances(prior_degrees=PIXEL_PRIOR_DEGREES, floor_px2=LEAST_PIXEL_SIGMA**2)
         shared = seen.shared_error(variances)

@@ -6,7 +6,7 @@
 
 use super::algebra::{NULL_PIVOT, add_square, spread};
 use super::block::{BLOCK, Block, Row};
-use super::forms::{Form, Moved, Observed, packed};
+use super::forms::{Form, Moved, Observed, OfArm, packed};
 use crate::batched_algebra::{UPPER, load, upper};
 use crate::simd::{Kernel, Simd, Vector};
 
@@ -59,6 +59,9 @@ impl<const CAPACITY: usize, const PACKED: usize> Kernel for Wide<'_, CAPACITY, P
             if let Some(moved) = &self.form.moved {
                 add_moved(simd, moved, &before_y, size, &mut work.covariance);
             }
+            if let Some(arm) = &self.form.arm {
+                add_arm(simd, arm, self.block, (at, &before_y), size, &mut work.covariance);
+            }
             for k in 0..size {
                 work.floors[k] = simd.splat(NULL_PIVOT) * work.covariance[packed(size, k, k)];
             }
@@ -75,7 +78,7 @@ impl<const CAPACITY: usize, const PACKED: usize> Kernel for Wide<'_, CAPACITY, P
                         work.take(simd, k, 0);
                     }
                     let rows = &mut observed_rows[..observed.constant.len()];
-                    observe(simd, observed, &before_y, rows);
+                    observe(simd, observed, self.block, (at, &before_y), rows);
                     let mut trace = zero;
                     for row in rows {
                         work.weigh(simd, row);
@@ -90,7 +93,7 @@ impl<const CAPACITY: usize, const PACKED: usize> Kernel for Wide<'_, CAPACITY, P
                         work.take(simd, k, 0);
                     }
                     let rows = &mut observed_rows[..6];
-                    observe(simd, observed, &before_y, rows);
+                    observe(simd, observed, self.block, (at, &before_y), rows);
                     for i in 0..6 {
                         work.weigh(simd, &rows[i]);
                         for j in i..6 {
@@ -135,29 +138,93 @@ fn add_moved<S: Simd>(
     }
 }
 
-/// `Z = constant + [of_y C', 0]`; a row `[a, b]` of `of_y` times `C'` is `[R a + t x R b, R b]`.
+/// Adds `U U'` of the arm's constants, and the covariance of its noise.
+#[inline(always)]
+fn add_arm<S: Simd>(
+    simd: S,
+    arm: &OfArm,
+    block: &Block,
+    (at, before_y): (usize, &[S::Vector; 12]),
+    size: usize,
+    covariance: &mut [S::Vector],
+) {
+    let moved = |column: usize| {
+        let rows = &block.arm[6 * column..6 * column + 6];
+        [0, 1, 2, 3, 4, 5].map(|i: usize| simd.load(&rows[i][at..]))
+    };
+    let mut square = [simd.splat(0.0); UPPER];
+    let add = |u: &[S::Vector; 6], square: &mut [S::Vector; UPPER]| {
+        for i in 0..6 {
+            for j in i..6 {
+                square[upper(i, j)] = u[i].mul_add(u[j], square[upper(i, j)]);
+            }
+        }
+    };
+    for (j, column) in arm.columns.iter().enumerate() {
+        let mut u = column.of_x.map(|x| simd.splat(x));
+        add_turned(simd, &column.of_y, before_y, &mut u);
+        for (l, row) in arm.root.iter().enumerate().skip(j) {
+            let factor = simd.splat(row[j]);
+            for (u, e) in u.iter_mut().zip(moved(l)) {
+                *u = e.mul_add(factor, *u);
+            }
+        }
+        add(&u, &mut square);
+        for (i, u) in u.iter().enumerate() {
+            let row = &mut covariance[packed(size, i, 6.min(size - 1))..][..size - 6];
+            for (entry, pixel) in row.iter_mut().zip(&column.pixel) {
+                *entry = u.mul_add(simd.splat(*pixel), *entry);
+            }
+        }
+    }
+    let (constants, noise) = block.arm_counts;
+    for column in constants..constants + noise {
+        add(&moved(column), &mut square);
+    }
+    for i in 0..6 {
+        for j in i..6 {
+            let entry = &mut covariance[packed(size, i, j)];
+            *entry = *entry + square[upper(i, j)];
+        }
+    }
+}
+
+/// Adds `C [a, b]`, `C = Ad(T)`: `[R a + t x R b, R b]`.
+#[inline(always)]
+fn add_turned<S: Simd>(simd: S, of_y: &[f64; 6], t: &[S::Vector; 12], to: &mut [S::Vector]) {
+    let mut low = [simd.splat(0.0); 3];
+    for i in 0..3 {
+        for k in 0..3 {
+            to[i] = t[3 * i + k].mul_add(simd.splat(of_y[k]), to[i]);
+            low[i] = t[3 * i + k].mul_add(simd.splat(of_y[3 + k]), low[i]);
+        }
+    }
+    for i in 0..3 {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        to[i] = t[9 + b].neg_mul_add(low[a], t[9 + a].mul_add(low[b], to[i]));
+        to[3 + i] = to[3 + i] + low[i];
+    }
+}
+
+/// `Z = constant + [of_y C' + of_arm E', 0]`.
 #[inline(always)]
 fn observe<S: Simd, const CAPACITY: usize>(
     simd: S,
     observed: &Observed,
-    t: &[S::Vector; 12],
+    block: &Block,
+    (at, t): (usize, &[S::Vector; 12]),
     rows: &mut [[S::Vector; CAPACITY]],
 ) {
-    for ((to, constant), of_y) in rows.iter_mut().zip(&observed.constant).zip(&observed.of_y) {
+    let parts = observed.constant.iter().zip(&observed.of_y).zip(&observed.of_arm);
+    for (to, ((constant, of_y), of_arm)) in rows.iter_mut().zip(parts) {
         for (to, constant) in to.iter_mut().zip(constant) {
             *to = simd.splat(*constant);
         }
-        let mut low = [simd.splat(0.0); 3];
-        for i in 0..3 {
-            for k in 0..3 {
-                to[i] = t[3 * i + k].mul_add(simd.splat(of_y[k]), to[i]);
-                low[i] = t[3 * i + k].mul_add(simd.splat(of_y[3 + k]), low[i]);
+        add_turned(simd, of_y, t, to);
+        for (value, moved) in of_arm.iter().zip(block.arm.chunks_exact(6)) {
+            for (to, row) in to.iter_mut().zip(moved) {
+                *to = simd.load(&row[at..]).mul_add(simd.splat(*value), *to);
             }
-        }
-        for i in 0..3 {
-            let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-            to[i] = t[9 + b].neg_mul_add(low[a], t[9 + a].mul_add(low[b], to[i]));
-            to[3 + i] = to[3 + i] + low[i];
         }
     }
 }
