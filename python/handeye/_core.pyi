@@ -447,6 +447,9 @@ class Posterior:
     def levels(self) -> list[list[float]]: ...
     @property
     def degrees_of_freedom(self) -> list[float]: ...
+    def degrees_of_freedom_of(self, combinations: ArrayLike) -> list[float]:
+        """Degrees of freedom of the covariance of six linear combinations of `theta`, each of (K, 6, n)."""
+
     @property
     def attribution(self) -> list[tuple[str, float, float]]: ...
     @property

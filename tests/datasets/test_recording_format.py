@@ -152,7 +152,7 @@ FAULTS: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "cut off after a view": (toml(r"\[\[view\]\]\nname = \"im_2\".*", ""), "truncated", "2 views, but view_count is 3"),
     "no text": (lambda f: (f / "recording.toml").write_bytes(b"a = '\xff'"), "not_text", "byte 5"),
     "another format": (toml('"handeye-recording"', '"bag"'), "unknown_format", "'bag'"),
-    "a newer version": (toml("version = 1", "version = 2"), "newer_version", "version 2"),
+    "a newer version": (toml("version = 1", "version = 3"), "newer_version", "version 3"),
     "no version": (toml("version = 1", "version = true"), "invalid_field", "version"),
     "an unknown field": (toml("mounting = ", "colour = 1\nmounting = "), "invalid_field", "colour"),
     "an unknown mounting": (toml('"eye_in_hand"', '"eye_on_hand"'), "invalid_field", "mounting"),

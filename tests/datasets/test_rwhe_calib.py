@@ -27,7 +27,7 @@ def test_images_and_poses_are_paired_in_the_order_of_counting(tmp_path: Path) ->
     assert [shot.image for shot in found.shots] == ["im_8.png", "im_9.png", "im_10.png"]
     for k, shot in enumerate(found.shots):
         np.testing.assert_allclose(shot.T_base_flange.matrix, some_pose(k).matrix, atol=1e-8)
-        assert found.image_path(shot).is_file()
+        assert (found.folder / str(shot.image)).is_file()
     assert found.target == Chessboard(3, 4, 0.2)
     assert found.image_size_px == SIZE
     assert found.mounting is Mounting.EYE_IN_HAND

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from handeye.datasets import ImageSet, load
-from handeye.datasets.images import read_image
 from handeye.detection import Detection, Prediction, calibrate_camera, detect
 
 # Every so many views; `tools/measure_detection.py public` looks at all.
@@ -24,7 +23,7 @@ def check(folder: Path, views: int, fewest: float, error_px: float) -> None:
     found: dict[str, Detection] = {}
     size = (0, 0)
     for shot in images.shots[::STEP]:
-        image = read_image(images.image_path(shot))
+        image = images.grey(shot)
         size = (image.shape[1], image.shape[0])
         whole = detect(image, images.target)
         assert isinstance(whole, Detection), (shot.name, whole)

@@ -263,7 +263,7 @@ def test_millimetres_of_the_robot_alone(handeye: Handeye, tmp_path: Path, model:
 
 
 def test_newer_version(refused: Refused, made: Path) -> None:
-    replaced(made / "recording.toml", "version = 1", "version = 2")
+    replaced(made / "recording.toml", "version = 1", "version = 3")
     error = refused(made)
     assert (error["exit_code"], error["code"]) == (3, "newer_version")
     assert "update handeye" in str(error["hint"])

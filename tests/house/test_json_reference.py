@@ -1,5 +1,6 @@
 """The reference of the JSON keys and the commands agree: no key undocumented, none documented that is not there."""
 
+import json
 import re
 import shutil
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from typing import Any
 import cv2
 import pytest
 
+from bags_written import Journey, write
 from commands import Handeye
 from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
@@ -84,12 +86,16 @@ def test_solve(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     open_directions = written(parallel_recording(), tmp_path / "parallel")
     links_off = simulate(ErrorKind.SMOOTH_KINEMATIC, 2, CellOptions(length_sigma_m=(5e-4, 5e-4)))
     of_arm = written(links_off, tmp_path / "arm")
+    journey = Journey(stations=3, picture_hz=4)
+    (tmp_path / "board.json").write_text(json.dumps(journey.target.to_dict()))
+    bag = write(tmp_path / "bag", "mcap", journey)
     compare(
         "handeye solve",
         handeye.json("solve", shipped),
         handeye.json("solve", shipped, "--model", "paper"),
         handeye.json("solve", open_directions, "--reduced"),
         handeye.json("solve", of_arm, "--robot", "ur5e"),
+        handeye.json("solve", bag, "--target", tmp_path / "board.json", "--reduced"),
     )
 
 

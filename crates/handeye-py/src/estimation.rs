@@ -7,7 +7,7 @@ use handeye_core::estimation::{
 };
 use handeye_core::least_squares::{PixelParameters, Problem as CoreProblem};
 use handeye_core::se3::Se3;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
@@ -341,6 +341,16 @@ impl Posterior {
     #[getter]
     fn degrees_of_freedom(&self) -> Vec<f64> {
         self.inner.degrees_of_freedom.clone()
+    }
+
+    /// Degrees of freedom of the covariance of six linear combinations of `theta`, each of (K, 6, n).
+    fn degrees_of_freedom_of(&self, py: Python<'_>, combinations: Array<'_>) -> PyResult<Vec<f64>> {
+        let combinations = jacobian_list(py, &combinations)?;
+        if combinations.iter().any(|c| c.ncols() != self.inner.theta.len()) {
+            return Err(invalid(py, "combinations must have a column per parameter"));
+        }
+        let fixed = |c: DMatrix<f64>| c.fixed_rows::<6>(0).into_owned();
+        Ok(combinations.into_iter().map(|c| self.inner.degrees_of_freedom_of(&fixed(c))).collect())
     }
 
     /// Minus the logarithm of the posterior density of the levels at their mode.

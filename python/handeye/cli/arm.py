@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError
-from handeye.robots import ArmKinematics, arm_kinematics, open_arm
+from handeye.robots import Arm, ArmKinematics, arm_kinematics, open_arm
 from handeye.types import Recording
 from handeye.types.calibration import ModelName
 
@@ -24,6 +24,22 @@ class ArmSource:
     robot_tip: str | None = None
     """Link, or in MJCF body or site, whose pose is reported, where the last one is not."""
 
+    def described(self) -> Arm | None:
+        """Return the arm, None if none is named.
+
+        Raises
+        ------
+        UsageError
+            Links of no arm.
+        InputError
+            No such arm, or one that cannot be used.
+        """
+        if self.robot is None:
+            if self.robot_base is not None or self.robot_tip is not None:
+                raise UsageError("--robot-base and --robot-tip are links of the URDF given with --robot")
+            return None
+        return open_arm(self.robot, base=self.robot_base, tip=self.robot_tip)
+
     def kinematics(self, recording: Recording, model: ModelName) -> ArmKinematics | None:
         """Return the kinematics of the arm in the frames of the recording's poses, None if no arm is named.
 
@@ -34,14 +50,10 @@ class ArmSource:
         InputError
             No such arm, one that cannot be used, or poses that are not this arm's.
         """
-        if self.robot is None:
-            if self.robot_base is not None or self.robot_tip is not None:
-                raise UsageError("--robot-base and --robot-tip are links of the URDF given with --robot")
-            return None
-        if model is ModelName.PAPER:
+        if self.robot is not None and model is ModelName.PAPER:
             raise UsageError(
                 "the paper's model takes the robot as exact, and has no use for --robot",
                 hint="leave --robot or --model paper away",
             )
-        arm = open_arm(self.robot, base=self.robot_base, tip=self.robot_tip)
-        return arm_kinematics(arm, recording.views)
+        arm = self.described()
+        return None if arm is None else arm_kinematics(arm, recording.views)

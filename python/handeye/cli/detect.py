@@ -13,7 +13,7 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
 from handeye.cli.source import Board
-from handeye.datasets import ImageSet, PosePairs, UnreadPoses, load
+from handeye.datasets import ImageSet, LoadedRecording, UnreadPoses, load
 from handeye.datasets.image_header import IMAGE_SUFFIXES
 from handeye.datasets.images import read_image
 from handeye.datasets.reading import existing_folder, file_names
@@ -122,11 +122,11 @@ def _target(path: Path, board: Board) -> Target | None:
         loaded = load(path if path.is_dir() else path.parent, pattern=pattern)
     except HandeyeError:
         return None if pattern is None else Chessboard(*pattern, ANY_PITCH_M)
-    if isinstance(loaded, PosePairs):
-        return None
+    if isinstance(loaded, LoadedRecording):
+        return loaded.recording.target
     if isinstance(loaded, UnreadPoses):
         return loaded.images.target
-    return loaded.target if isinstance(loaded, ImageSet) else loaded.recording.target
+    return loaded.target if isinstance(loaded, ImageSet) else None
 
 
 def _looked_for(pictures: list[Path], target: Target) -> list[_Seen]:

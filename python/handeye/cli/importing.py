@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
+from handeye.cli.arm import ArmSource
 from handeye.cli.options import Common
 from handeye.cli.output import check_new_folder
 from handeye.cli.source import Source
@@ -21,25 +22,27 @@ def import_folder(
     *,
     images: bool = False,
     source: Source = Source(),  # noqa: B008 - frozen
+    arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Turn a folder of images and robot poses into a recording.
 
-    The layouts of rwhe-calib and robot_cal_tools are recognised. The target is found in the images and, if
-    the files hold no camera, the camera is calibrated from them. The recording keeps corners, poses, camera
-    and target, so solving it again needs no image. A recording is copied, with another camera if given.
+    Pictures with a file of poses, bags of ROS and the layouts of other tools are recognised (docs: import).
+    The target is found in the images and, if the files hold no camera, the camera is calibrated from them.
+    The recording keeps corners, poses, camera and target, so solving it again needs no image. A recording is
+    copied, with another camera if given.
 
     Parameters
     ----------
     folder
-        Folder with the images and poses.
+        Folder with the images and poses, or a bag.
     destination
         Folder of the recording, which does not exist yet or is empty.
     images
         Copy the images too.
     """
     check_new_folder(destination)
-    opened = source.open(folder)
+    opened = source.open(folder, arm.described())
     write_recording(opened.recording, destination, images_from=opened.folder if images else None)
     check_written(opened.recording, destination)
     data = _data(opened, destination)
@@ -53,6 +56,7 @@ def _data(opened: Opened, destination: Path) -> dict[str, Any]:
         "destination": str(destination),
         "mounting": opened.recording.mounting.value,
         "camera_origin": opened.camera_origin.value,
+        **({} if opened.timing is None else {"timing": opened.timing.to_dict()}),
         "camera": opened.recording.camera.to_dict(),
         "target": opened.recording.target.to_dict(),
         "views": {
@@ -73,6 +77,7 @@ def _show(console: "Console", opened: Opened, destination: Path) -> None:
         ("layout", opened.layout),
         ("target", f"{recording.target.family}, {recording.target.point_count} points"),
         ("camera", camera_line(opened)),
+        *([] if opened.timing is None else [("timing", str(opened.timing))]),
         ("written", str(destination)),
     ]
     pairs(console, rows)

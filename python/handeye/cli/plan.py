@@ -122,7 +122,7 @@ def plan(
         raise UsageError(f"--speed-deg-s {speed_deg_s}, expected above zero")
     worth = _criterion(criterion, tool_point_mm)
     table = None if candidates is None else read_poses(candidates, source.stated())
-    opened = (source if table is None else source.of_a_recording(folder)).open(folder)
+    opened = (source if table is None else source.of_a_recording(folder)).open(folder, arm.described())
     measurements = Measurements.of_recording(opened.recording)
     check_views(measurements)
     taken = _taken(measurements, used, first, with_file=table is not None)

@@ -54,7 +54,7 @@ def solve(
         Also write the JSON object to this file.
     """
     check_output(output)
-    opened = source.open_any(folder)
+    opened = source.open_any(folder, arm.described())
     if isinstance(opened, PosePairs):
         return answer_for_poses(opened, output)
     with mindful_of(opened.warnings):
@@ -80,6 +80,7 @@ def _data(opened: Opened, calibration: Calibration, region: Ellipsoid) -> dict[s
         "within_95": within(calibration.covariance, calibration.degrees_of_freedom).to_dict(),
         **data,
         "camera_origin": opened.camera_origin.value,
+        **({} if opened.timing is None else {"timing": opened.timing.to_dict()}),
         "position_region": region.to_dict(),
     }
 
@@ -139,6 +140,7 @@ def _show(
             ("noise", _noise(calibration)),
             *((f"joint {offset.joint}", _offset(offset)) for offset in calibration.joint_offsets),
             ("camera", camera_line(opened)),
+            *([] if opened.timing is None else [("timing", str(opened.timing))]),
         ],
     )
     notices(console, "Left out", (f"{name}: {why}" for name, why in left_out.items()))

@@ -11,10 +11,11 @@ from cyclopts import Parameter
 from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
 from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, read_target
-from handeye.datasets.recording_format import FILE_NAME
+from handeye.datasets.recording_header import FILE_NAME
 from handeye.errors import HandeyeError
-from handeye.importing import Opened, SourceOptions, open_any, open_folder
+from handeye.importing import BagOptions, Opened, SourceOptions, open_any, open_folder
 from handeye.notations import Direction, Unit, notation_of
+from handeye.robots import Arm
 from handeye.types import Chessboard, Mounting, Target
 
 
@@ -77,9 +78,17 @@ class Source(Board):
     """Unit of their lengths."""
     poses_are: Direction | None = None
     """Whose pose in which frame they are; the flange in the base if not given."""
+    image_topic: str | None = None
+    """In a bag: topic of the pictures."""
+    pose_topic: str | None = None
+    """In a bag: topic of the flange's poses or of the joints, in place of tf."""
+    base_frame: str | None = None
+    """In a bag: frame of the robot's base in tf."""
+    flange_frame: str | None = None
+    """In a bag: frame of the flange in tf."""
     layout: Annotated[str | None, Parameter(help="Layout of the files, where several fit.")] = None
 
-    def options(self) -> SourceOptions:
+    def options(self, arm: Arm | None = None) -> SourceOptions:
         """Return the options as the library takes them.
 
         Raises
@@ -98,6 +107,8 @@ class Source(Board):
             camera=None if self.camera is None else read_camera(self.camera),
             poses=self.poses,
             stated=self.stated(),
+            bag=BagOptions(self.image_topic, self.pose_topic, self.base_frame, self.flange_frame),
+            arm=arm,
         )
 
     def stated(self) -> Statement:
@@ -121,7 +132,7 @@ class Source(Board):
             return self
         return replace(self, notation=None, unit=None, poses_are=None)
 
-    def open_any(self, folder: Path) -> Opened | PosePairs:
+    def open_any(self, folder: Path, arm: Arm | None = None) -> Opened | PosePairs:
         """Read a folder or a file, also one that holds poses of the target instead of pictures.
 
         Raises
@@ -129,11 +140,11 @@ class Source(Board):
         UsageError, InputError, DetectionError
             As `options` and `handeye.importing.open_any`.
         """
-        options = self.options()
+        options = self.options(arm)
         with progress("Looking for the target in the images") as advance:
             return open_any(folder, options, progress=advance)
 
-    def open(self, folder: Path) -> Opened:
+    def open(self, folder: Path, arm: Arm | None = None) -> Opened:
         """Read a folder, with progress where the target has to be found in images first.
 
         Raises
@@ -141,7 +152,7 @@ class Source(Board):
         UsageError, InputError, DetectionError
             As `options` and `handeye.importing.open_folder`.
         """
-        options = self.options()
+        options = self.options(arm)
         with progress("Looking for the target in the images") as advance:
             return open_folder(folder, options, progress=advance)
 

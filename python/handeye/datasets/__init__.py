@@ -15,6 +15,8 @@ from handeye.datasets.pose_pairs import PosePair, PosePairs
 from handeye.datasets.pose_rows import PoseRows, Reading, Statement
 from handeye.datasets.read_back import check_written
 from handeye.datasets.recording_format import LoadedRecording, read_recording, write_recording
+from handeye.datasets.recording_header import holds_several
+from handeye.datasets.rig_format import LoadedRig, read_rig, rig_warnings, write_rig
 
 __all__ = [
     "IMPORTERS",
@@ -23,6 +25,7 @@ __all__ = [
     "ImportOptions",
     "Importer",
     "LoadedRecording",
+    "LoadedRig",
     "PosePair",
     "PosePairs",
     "PoseRows",
@@ -32,12 +35,16 @@ __all__ = [
     "Statement",
     "UnreadPoses",
     "check_written",
+    "holds_several",
     "load",
     "read_camera",
     "read_pose_rows",
     "read_poses",
     "read_recording",
+    "read_rig",
     "read_target",
     "recording_warnings",
+    "rig_warnings",
     "write_recording",
+    "write_rig",
 ]

@@ -38,24 +38,35 @@ def image_size(path: Path) -> tuple[int, int] | None:
     InputError
         The file cannot be read, is truncated, or is not the image that its name says.
     """
-    read = _READERS.get(path.suffix.lower())
-    if read is None:
+    if path.suffix.lower() not in _READERS:
         return None
     if not path.is_file():
         raise InputError(f"{path}: not a regular file", code="unreadable")
     try:
         with path.open("rb") as file:
-            width, height = read(file)
+            return size_in(file, path.suffix.lower(), str(path))
     except OSError as error:
         raise InputError(f"{path}: {reason(error)}", code="unreadable") from error
+
+
+def size_in(file: BinaryIO, suffix: str, where: str) -> tuple[int, int]:
+    """Return width and height in pixels of a complete image of the kind that a suffix names.
+
+    Raises
+    ------
+    InputError
+        It is truncated, or no such image.
+    """
+    try:
+        width, height = _READERS[suffix](file)
     except (EOFError, struct.error) as error:
         raise InputError(
-            f"{path}: the image is truncated", code="truncated_image", hint="copy the file again"
+            f"{where}: the image is truncated", code="truncated_image", hint="copy the file again"
         ) from error
     except ValueError as error:
-        raise InputError(f"{path}: {error}", code="not_an_image", hint="check what this file is") from error
+        raise InputError(f"{where}: {error}", code="not_an_image", hint="check what this file is") from error
     if not (0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE):
-        raise InputError(f"{path}: an image of {width} x {height} pixels", code="not_an_image")
+        raise InputError(f"{where}: an image of {width} x {height} pixels", code="not_an_image")
     return width, height
 
 

@@ -1,12 +1,14 @@
 """What a foreign layout gives: images and robot poses, before detection."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from handeye.datasets.image_header import image_size
+from handeye.datasets.images import read_image
 from handeye.datasets.plausibility import DataWarning
 from handeye.datasets.pose_rows import NOTHING_STATED, PoseRows, Reading, Statement
 from handeye.datasets.reading import inside
@@ -24,9 +26,12 @@ class Shot:
     name
         Name of the view to be.
     image
-        Path of the image relative to the folder of the image set, with `/`.
+        Path of the image relative to the folder of the image set, with `/`; None where it is in no file of
+        its own.
     T_base_flange
         Pose of the flange in the robot base.
+    joints_rad
+        Joint positions (radians; metres for sliding joints); None if unknown.
 
     Raises
     ------
@@ -35,12 +40,14 @@ class Shot:
     """
 
     name: str
-    image: str
+    image: str | None
     T_base_flange: Pose
+    joints_rad: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         check_view_name(self.name)
-        check_relative_path(self.image, f"view {self.name}: image")
+        if self.image is not None:
+            check_relative_path(self.image, f"view {self.name}: image")
 
     def with_points(
         self, point_ids: ArrayLike, pixels: ArrayLike, sigmas_px: ArrayLike | None = None
@@ -52,7 +59,15 @@ class Shot:
         InputError
             As `View`.
         """
-        return View(self.name, self.T_base_flange, point_ids, pixels, image=self.image, sigmas_px=sigmas_px)
+        return View(
+            self.name,
+            self.T_base_flange,
+            point_ids,
+            pixels,
+            image=self.image,
+            joints_rad=self.joints_rad,
+            sigmas_px=sigmas_px,
+        )
 
 
 @dataclass(frozen=True)
@@ -83,6 +98,8 @@ class ImageSet:
         Where the data came from, in words; to be cited with results.
     warnings
         Values that are possible but hardly meant, and choices that the files left open.
+    pictures
+        What gives the grey values (H, W) of a shot that has no file of its own, by its name.
     """
 
     name: str
@@ -96,10 +113,19 @@ class ImageSet:
     truth: Truth | None = None
     source: str = ""
     warnings: tuple[DataWarning, ...] = ()
+    pictures: Mapping[str, Callable[[], NDArray[np.uint8]]] = field(
+        default_factory=dict[str, Callable[[], NDArray[np.uint8]]]
+    )
 
-    def image_path(self, shot: Shot) -> Path:
-        """Return the path of the image of a shot."""
-        return self.folder / shot.image
+    def grey(self, shot: Shot) -> NDArray[np.uint8]:
+        """Return the grey values (H, W) of a shot.
+
+        Raises
+        ------
+        InputError
+            As `handeye.datasets.images.read_image`.
+        """
+        return self.pictures[shot.name]() if shot.image is None else read_image(self.folder / shot.image)
 
     def recording(self, camera: Camera, views: Iterable[View]) -> Recording:
         """Return the recording made of the views in which the target was found.
@@ -169,6 +195,8 @@ def common_image_size(folder: Path, shots: Iterable[Shot]) -> tuple[int, int] | 
     """
     first: tuple[Shot, tuple[int, int]] | None = None
     for shot in shots:
+        if shot.image is None:
+            continue
         size = image_size(inside(folder, shot.image, f"view {shot.name}: image"))
         if size is None:
             continue

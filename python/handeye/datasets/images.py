@@ -1,6 +1,7 @@
 """Reading an image as grey values, without trusting the file."""
 
 import struct
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handeye.datasets.image_header import IMAGE_SUFFIXES, image_size
+from handeye.datasets.image_header import IMAGE_SUFFIXES, image_size, size_in
 from handeye.datasets.reading import MIB, read_bytes
 from handeye.errors import InputError
 
@@ -40,43 +41,74 @@ def read_image(path: Path) -> NDArray[np.uint8]:
             f"{path}: expected an image ({', '.join(sorted(IMAGE_SUFFIXES))})", code="not_an_image"
         )
     content = read_bytes(path, MAX_BYTES)
+    return decoded(content, path.suffix.lower(), str(path), image_size(path) or _tiff_size(content, path))
+
+
+def decoded(
+    content: bytes, suffix: str, where: str, size: tuple[int, int] | None = None
+) -> NDArray[np.uint8]:
+    """Return the grey values (H, W) of a picture as a camera or a person saved it.
+
+    Parameters
+    ----------
+    content
+        The bytes of its file.
+    suffix
+        What kind of file it is, such as `.png`.
+    where
+        What to call it in a message.
+    size
+        Width and height that its header says, if they are known.
+
+    Raises
+    ------
+    InputError
+        As `read_image`.
+    """
     # Sizes are looked at before anything is decoded: a small file can claim to be a very large image.
-    width, height = image_size(path) or _tiff_size(content, path)
+    width, height = size or size_in(BytesIO(content), suffix, where)
     if width * height > MAX_PIXELS:
         raise InputError(
-            f"{path}: {width} x {height} pixels, expected at most {MAX_PIXELS}", code="too_large"
+            f"{where}: {width} x {height} pixels, expected at most {MAX_PIXELS}", code="too_large"
         )
     if width * height > max(ALWAYS_PIXELS, PIXELS_PER_BYTE * len(content)):
         raise InputError(
-            f"{path}: {width} x {height} pixels in {len(content)} bytes, which no camera's picture has",
+            f"{where}: {width} x {height} pixels in {len(content)} bytes, which no camera's picture has",
             code="too_large",
             hint="check what this file is",
         )
-    scans = content.count(b"\xff\xda") if path.suffix.lower() in {".jpg", ".jpeg"} else 1
+    scans = content.count(b"\xff\xda") if suffix in {".jpg", ".jpeg"} else 1
     if scans > MAX_SCANS:
         raise InputError(
-            f"{path}: a JPEG image of {scans} scans, expected at most {MAX_SCANS}",
+            f"{where}: a JPEG image of {scans} scans, expected at most {MAX_SCANS}",
             code="too_large",
             hint="save the image again without progressive encoding",
         )
     try:
         image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), _FLAGS)
     except cv2.error as error:
-        raise _damaged(path, str(error).strip()[:200]) from error
+        raise _damaged(where, str(error).strip()[:200]) from error
     if image is None:
-        raise _damaged(path, "it cannot be decoded")
+        raise _damaged(where, "it cannot be decoded")
     if image.shape != (height, width):
         found = f"{image.shape[1]} x {image.shape[0]} pixels where its header says {width} x {height}"
-        raise _damaged(path, found)
-    return _eight_bits(image, path)
+        raise _damaged(where, found)
+    return eight_bits(image, where)
 
 
-def _eight_bits(image: NDArray[np.integer[Any] | np.floating[Any]], path: Path) -> NDArray[np.uint8]:
+def eight_bits(image: NDArray[np.integer[Any] | np.floating[Any]], where: str) -> NDArray[np.uint8]:
+    """Return grey values (H, W) of 8 bits; those of 16 bits are shifted in place.
+
+    Raises
+    ------
+    InputError
+        Values of another kind.
+    """
     if image.dtype == np.uint8:
         return np.ascontiguousarray(image, dtype=np.uint8)
     if image.dtype != np.uint16:
         raise InputError(
-            f"{path}: pixels of {image.dtype}, expected 8 or 16 bits",
+            f"{where}: pixels of {image.dtype}, expected 8 or 16 bits",
             code="not_an_image",
             hint="save the image with whole grey values",
         )
@@ -86,8 +118,8 @@ def _eight_bits(image: NDArray[np.integer[Any] | np.floating[Any]], path: Path) 
     return image.astype(np.uint8)
 
 
-def _damaged(path: Path, found: str) -> InputError:
-    return InputError(f"{path}: a damaged image: {found}", code="damaged_image", hint="copy the file again")
+def _damaged(where: str, found: str) -> InputError:
+    return InputError(f"{where}: a damaged image: {found}", code="damaged_image", hint="copy the file again")
 
 
 def _tiff_size(content: bytes, path: Path) -> tuple[int, int]:

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from handeye.datasets.bags.contents import Contents
 from handeye.datasets.image_set import ImageSet, ImportOptions, UnreadPoses
 from handeye.datasets.pose_pairs import PosePairs
 
-Imported = ImageSet | UnreadPoses | PosePairs
+Imported = ImageSet | UnreadPoses | PosePairs | Contents
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,13 @@ from handeye.datasets import (
     rwhe_calib,
     visp,
 )
+from handeye.datasets.bags import importer as bags
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Imported, Importer
 from handeye.datasets.pose_rows import NOTHING_STATED, Statement
 from handeye.datasets.reading import existing_folder, is_file
 from handeye.datasets.recording_format import LoadedRecording
+from handeye.datasets.recording_header import FILE_NAME
 from handeye.errors import InputError
 from handeye.types import Mounting, Target
 
@@ -30,6 +32,7 @@ IMPORTERS: dict[str, Importer] = {
         easy_handeye2.IMPORTER,
         moveit_samples.IMPORTER,
         visp.IMPORTER,
+        bags.IMPORTER,
         pose_list.IMPORTER,
     )
 }
@@ -61,9 +64,10 @@ def load(
 
     Returns
     -------
-    LoadedRecording, ImageSet, UnreadPoses or PosePairs
+    LoadedRecording, ImageSet, UnreadPoses, PosePairs or Contents
         An `ImageSet` has no points yet: they are still to be detected; of `UnreadPoses` not even the robot's
-        poses are known; `PosePairs` never had pictures.
+        poses are known; `PosePairs` never had pictures; of the `Contents` of a bag it is still to be chosen
+        what counts.
 
     Raises
     ------
@@ -79,12 +83,12 @@ def load(
                 f"layout {layout!r}, expected one of {', '.join(IMPORTERS)}", code="unknown_format"
             )
         return importer.read(folder, options)
-    if is_file(folder / recording_format.FILE_NAME):
+    if is_file(folder / FILE_NAME):
         if options != ImportOptions():
             raise InputError(
                 f"{folder}: a recording says its target, mounting and poses itself",
                 code="options_unused",
-                hint=f"leave the options out, or change {recording_format.FILE_NAME}",
+                hint=f"leave the options out, or change {FILE_NAME}",
             )
         return recording_format.read_recording(folder)
     if poses is not None or options.stated != NOTHING_STATED:
@@ -114,7 +118,7 @@ def _place(path: str | os.PathLike[str]) -> Path:
                 code="unknown_format",
                 hint="give the folder with the text files",
             )
-        known = {recording_format.FILE_NAME, rwhe_calib.POSES_FILE, *robot_cal_tools.LIST_FILES}
+        known = {FILE_NAME, rwhe_calib.POSES_FILE, *robot_cal_tools.LIST_FILES}
         if is_file(given):
             return given.parent if given.name in known else given
         return existing_folder(given)
@@ -123,15 +127,13 @@ def _place(path: str | os.PathLike[str]) -> Path:
 
 
 def _not_recognised(folder: Path) -> InputError:
-    kinds = "; ".join(
-        [f"a folder with {recording_format.FILE_NAME}", *(i.looks_like for i in IMPORTERS.values())]
-    )
+    kinds = "; ".join([f"a folder with {FILE_NAME}", *(i.looks_like for i in IMPORTERS.values())])
     below: list[str] = []
     try:
         with os.scandir(folder) as entries:
             for entry, _ in zip(entries, range(1000), strict=False):
                 inner = folder / entry.name
-                if entry.is_dir() and (recognise(inner) or is_file(inner / recording_format.FILE_NAME)):
+                if entry.is_dir() and (recognise(inner) or is_file(inner / FILE_NAME)):
                     below.append(entry.name)
     except OSError:
         below = []

@@ -72,7 +72,7 @@ def read(folder: Path, options: ImportOptions) -> ImageSet | UnreadPoses:
     poses = rows.poses(readings[0]) if known else (Pose.identity(),) * len(rows)
     shots = _shots(folder, [picture for _, picture in chosen], poses)
     size = common_image_size(folder, shots)
-    target = _target(folder, options)
+    target = stated_target(folder, options)
     camera, camera_notes = _camera(folder)
     images = ImageSet(
         name=folder.resolve().name,
@@ -259,7 +259,14 @@ def _shots(folder: Path, pictures: Sequence[str], poses: Sequence[Pose]) -> tupl
         return tuple(Shot(*triple) for triple in zip(names, pictures, poses, strict=True))
 
 
-def _target(folder: Path, options: ImportOptions) -> Target:
+def stated_target(folder: Path, options: ImportOptions) -> Target:
+    """Return the target that is stated, or that the only such file in a folder describes.
+
+    Raises
+    ------
+    InputError
+        Neither.
+    """
     if options.target is not None:
         return options.target
     files = [name for name in file_names(folder) if _TARGET.fullmatch(name)]

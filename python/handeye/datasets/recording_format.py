@@ -19,19 +19,14 @@ from typing import Any
 from handeye.datasets.corners import corners_text, read_corners
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning, recording_warnings
-from handeye.datasets.reading import MIB, existing_folder, inside, is_file, located, read_text
-from handeye.datasets.toml_reading import parse_toml
+from handeye.datasets.reading import existing_folder, inside, is_file, located, read_text
+from handeye.datasets.recording_header import FILE_NAME, FORMAT, MAX_BYTES, VERSION, read_versioned
 from handeye.datasets.toml_text import toml_text
 from handeye.datasets.writing import copy_file, is_occupied, new_folder, replace_file, write_file
 from handeye.errors import HandeyeError, InputError, OutputError
 from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth, View
 from handeye.types.plain import Document, read_document, without_none
 from handeye.types.view import check_view_name
-
-FORMAT = "handeye-recording"
-VERSION = 1
-FILE_NAME = "recording.toml"
-MAX_BYTES = 2 * MIB
 
 Rows = list[list[float]]
 
@@ -196,20 +191,12 @@ def write_recording(
 
 
 def _read_document(file: Path) -> _RecordingDocument:
-    text = read_text(file, MAX_BYTES)
-    data = parse_toml(text, file)
-    if data.get("format") != FORMAT:
+    data = read_versioned(file)
+    if data["version"] != VERSION:
         raise InputError(
-            f"{file}: format {str(data.get('format'))[:60]!r}, expected {FORMAT!r}", code="unknown_format"
-        )
-    version = data.get("version")
-    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise InputError(f"{file}: version {str(version)[:60]!r}, expected {VERSION}", code="invalid_field")
-    if version > VERSION:
-        raise InputError(
-            f"{file}: version {version}, this program reads up to {VERSION}",
-            code="newer_version",
-            hint="update handeye, or write the recording with the older version",
+            f"{file}: several cameras or targets, expected one of each",
+            code="several_cameras",
+            hint="handeye solve takes them together",
         )
     return read_document(data, _RecordingDocument, str(file))
 
@@ -282,7 +269,7 @@ def _write_view(view: View, folder: Path, images_from: Path | None) -> dict[str,
     """Write the files of a view under names that are free; return its table."""
     corners = _free_name(folder, "corners", view.name, ".csv")
     write_file(folder / corners, corners_text(view).encode())
-    return _view_table(view, corners, _keep_image(view, folder, images_from))
+    return _view_table(view, corners, keep_image(view, folder, images_from, view.name))
 
 
 def _view_table(view: View, corners: str, image: str | None) -> dict[str, Any]:
@@ -296,7 +283,7 @@ def _view_table(view: View, corners: str, image: str | None) -> dict[str, Any]:
     )
 
 
-def _keep_image(view: View, folder: Path, images_from: Path | None) -> str | None:
+def keep_image(view: View, folder: Path, images_from: Path | None, stem: str) -> str | None:
     """Return the path of the image in the folder, copied there if need be; None if there is none."""
     if view.image is None:
         return None
@@ -308,7 +295,7 @@ def _keep_image(view: View, folder: Path, images_from: Path | None) -> str | Non
             return view.image
     except (InputError, OSError) as error:
         raise OutputError(f"{folder}: {error}", code="missing_file") from error
-    name = _free_name(folder, "images", view.name, source.suffix.lower())
+    name = _free_name(folder, "images", stem, source.suffix.lower())
     try:
         (folder / "images").mkdir(exist_ok=True)
     except OSError as error:
@@ -372,7 +359,7 @@ def _updated_view(
     view: View, old: _ViewDocument | None, folder: Path, images_from: Path | None, written: list[Path]
 ) -> dict[str, Any]:
     if old is not None and _holds(folder, old.corners, corners_text(view)):
-        return _view_table(view, old.corners, _keep_image(view, folder, images_from))
+        return _view_table(view, old.corners, keep_image(view, folder, images_from, view.name))
     table = _write_view(view, folder, images_from)
     written.append(folder / table["corners"])
     return table

@@ -111,21 +111,32 @@ def _at_flange(noise: StationNoise, measurements: Measurements, arm: ArmModel | 
 
 def attribution(
     posterior: _core.Posterior,
-    measurements: Measurements,
     prior: CameraPrior,
     arm: ArmModel | None,
     noise: Noise,
+    *,
+    camera_shift: FloatArray,
+    camera_name: str,
+    board_scale: float,
 ) -> Finding:
     """Say in one line what explains the misfit of these views best.
 
     Something that can be put right (camera, board, clocks) is named if the likelihood needs it and it moves
     the measurements much; else the part of the robot that moves them most, if the robot is needed at all.
+
+    Parameters
+    ----------
+    posterior, arm, noise
+        What was found.
+    prior, camera_shift, camera_name
+        The camera that is off most, by how much in its free parameters, and its name where there are others.
+    board_scale
+        Of the board that is off most.
     """
     evidence = {name: loss for name, loss, _ in posterior.attribution}
     misfit = {name: value for name, _, value in posterior.attribution}
     total = sum(misfit.values()) or 1.0
     theta = np.asarray(posterior.theta)
-    start = 12 + len(prior.free)
     causes = [  # explains much of the misfit, or much of what the robot would be blamed for
         name
         for name in ("camera", "board_scale", "time_lag")
@@ -135,8 +146,8 @@ def attribution(
     if causes:
         cause = max(causes, key=lambda name: evidence[name])
         words = {
-            "camera": lambda: _camera_words(theta[12:start] - prior.mean, measurements, prior),
-            "board_scale": lambda: _board_words(theta[start]),
+            "camera": lambda: _camera_words(camera_shift, prior, camera_name),
+            "board_scale": lambda: _board_words(board_scale),
             "time_lag": lambda: _lag_words(theta, posterior),
         }[cause]()
         share = 100 * misfit[cause] / total
@@ -176,14 +187,15 @@ def _robot_words(
     return f"robot_{side}", words
 
 
-def _camera_words(shift: FloatArray, measurements: Measurements, prior: CameraPrior) -> str:
-    names = measurements.camera.parameter_names
+def _camera_words(shift: FloatArray, prior: CameraPrior, name: str) -> str:
+    names = prior.camera.parameter_names
     shifts = ", ".join(
         f"{names[i]} {value:+.2g} px"
         for i, value in zip(prior.free, shift, strict=True)
         if i < _PARAMETERS_IN_PX
     )
-    return f"the camera's calibration explains the misfit best: it wants {shifts}"
+    whose = f"the calibration of camera {name}" if name else "the camera's calibration"
+    return f"{whose} explains the misfit best: it wants {shifts}"
 
 
 def _board_words(scale: float) -> str:

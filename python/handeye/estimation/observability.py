@@ -57,9 +57,16 @@ def null_directions(measurements: Measurements, X: Pose, Y: Pose, noise: Noise) 
         open_here = vectors[:, values < UNDETERMINED**-2]
         if open_here.shape[1] > null.shape[1]:
             null = open_here
+    return plain_basis(null)
+
+
+def plain_basis(null: FloatArray) -> FloatArray:
+    """(D, 12) basis of a space (12, D) in which as few directions as possible rotate, these first.
+
+    Pure translations are easier to name.
+    """
     if null.shape[1] == 0:
         return np.zeros((0, 12))
-    # A basis in which as few directions as possible rotate: pure translations are easier to name.
     _, strengths, turns = np.linalg.svd(null[3:6])
     basis = (null @ turns.T).T
     rotating = np.zeros(len(basis), dtype=bool)
@@ -69,7 +76,11 @@ def null_directions(measurements: Measurements, X: Pose, Y: Pose, noise: Noise) 
 
 def undetermined(measurements: Measurements, X: Pose, Y: Pose, noise: Noise) -> tuple[Unobservable, ...]:
     """Name what the views leave open of X and Y, with the motion that would cure it; empty if nothing."""
-    directions = null_directions(measurements, X, Y, noise)
+    return named(measurements, X, null_directions(measurements, X, Y, noise))
+
+
+def named(measurements: Measurements, X: Pose, directions: FloatArray) -> tuple[Unobservable, ...]:
+    """Name directions (D, 12) of X and Y that are open, with the motion that would cure it."""
     if len(directions) == 0:
         return ()
     rotating = np.linalg.norm(directions[:, 3:6], axis=1) > PURE_TRANSLATION
@@ -83,10 +94,10 @@ def undetermined(measurements: Measurements, X: Pose, Y: Pose, noise: Noise) -> 
     if shifts == 3:
         camera = _frames(measurements.mounting)[0]
         sentence = f"the position of the camera in the {camera} frame is not determined in any direction"
-        named = [Unobservable(sentence, cure, _unit(d)) for d in directions[~rotating]]
+        shifted = [Unobservable(sentence, cure, _unit(d)) for d in directions[~rotating]]
     else:
-        named = [_translation(measurements, X, d, cure) for d in directions[~rotating]]
-    return tuple([_rotation(measurements, X, d, cure) for d in directions[rotating]] + named)
+        shifted = [_translation(measurements, X, d, cure) for d in directions[~rotating]]
+    return tuple([_rotation(measurements, X, d, cure) for d in directions[rotating]] + shifted)
 
 
 def _frames(mounting: Mounting) -> tuple[str, str]:

@@ -1,6 +1,20 @@
 """From any folder that can be read to a recording that can be solved: points detected, camera calibrated."""
 
+from handeye.importing.bag_choice import BagOptions
+from handeye.importing.bags import Timing
+from handeye.importing.lag import Lag
 from handeye.importing.opening import CameraOrigin, Opened, SourceOptions, open_any, open_folder
 from handeye.importing.poses_alone import PosesSolved, solve_poses
 
-__all__ = ["CameraOrigin", "Opened", "PosesSolved", "SourceOptions", "open_any", "open_folder", "solve_poses"]
+__all__ = [
+    "BagOptions",
+    "CameraOrigin",
+    "Lag",
+    "Opened",
+    "PosesSolved",
+    "SourceOptions",
+    "Timing",
+    "open_any",
+    "open_folder",
+    "solve_poses",
+]

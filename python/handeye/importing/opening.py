@@ -18,13 +18,18 @@ from handeye.datasets import (
     load,
     recording_warnings,
 )
-from handeye.datasets.images import read_image
+from handeye.datasets.bags import Contents
+from handeye.datasets.image_set import ImportOptions
+from handeye.datasets.pose_list import stated_target
 from handeye.datasets.pose_rows import NOTHING_STATED
 from handeye.detection import Detection, Image, Reason, calibrate_camera, detect_all
 from handeye.errors import DetectionError, HandeyeError, InputError
 from handeye.estimation import Measurements
+from handeye.importing.bag_choice import NOTHING_CHOSEN, BagOptions
+from handeye.importing.bags import Timing, pictures_of
 from handeye.importing.readings import compare
 from handeye.importing.unstated import unstated
+from handeye.robots import Arm
 from handeye.types import Camera, Mounting, Recording, Target
 
 # So many images from the first on, all with a board of another size: the size was given wrongly, and looking
@@ -63,6 +68,10 @@ class SourceOptions:
         File or folder with the robot's poses, where several fit.
     stated
         How these poses are written, as far as it is said.
+    bag
+        What counts in a bag.
+    arm
+        The robot, whose joints a bag or a file of poses may have in place of poses.
     """
 
     layout: str | None = None
@@ -72,6 +81,8 @@ class SourceOptions:
     camera: Camera | None = None
     poses: str | None = None
     stated: Statement = NOTHING_STATED
+    bag: BagOptions = NOTHING_CHOSEN
+    arm: Arm | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +103,8 @@ class Opened:
         Name of each image without the target, and why.
     warnings
         Values that are possible but hardly meant.
+    timing
+        How pictures and poses lie in time; None where they are no bag's.
     """
 
     recording: Recording
@@ -100,6 +113,7 @@ class Opened:
     camera_origin: CameraOrigin
     missed: Mapping[str, str] = field(default_factory=dict[str, str])
     warnings: tuple[DataWarning, ...] = ()
+    timing: Timing | None = None
 
 
 def open_folder(
@@ -167,6 +181,8 @@ def open_any(
         return _of_recording(loaded, options.camera)
     if isinstance(loaded, PosePairs):
         return loaded
+    if isinstance(loaded, Contents):
+        return _of_bag(loaded, options, progress or _nothing)
     if isinstance(loaded, UnreadPoses):
         opened = _of_images(loaded.images, options.camera, progress or _nothing)
         raise _told_by_pictures(loaded, opened.recording, options.mounting)
@@ -207,6 +223,20 @@ def _of_images(images: ImageSet, given: Camera | None, progress: Callable[[int, 
     return Opened(recording, images.folder, images.layout, origin, missed, tuple(warnings.values()))
 
 
+def _of_bag(contents: Contents, options: SourceOptions, progress: Callable[[int, int], None]) -> Opened:
+    place = contents.path if contents.path.is_dir() else contents.path.parent
+    target = stated_target(place, ImportOptions(options.target, options.pattern))
+    mounting = options.mounting or Mounting.EYE_IN_HAND
+    pictures = pictures_of(contents, options.bag, options.arm, target, mounting)
+    opened = _of_images(pictures.images(), options.camera, progress)
+    timing = pictures.timing(opened.recording)
+    if timing.lag is not None and pictures.misses_stations(timing.lag):
+        pictures.shift(timing.lag)
+        opened = _of_images(pictures.images(), options.camera, progress)
+        timing = pictures.timing(opened.recording)
+    return replace(opened, timing=timing)
+
+
 def _detect(
     images: ImageSet, progress: Callable[[int, int], None]
 ) -> tuple[Mapping[str, Detection], dict[str, str], tuple[int, int]]:
@@ -223,7 +253,7 @@ def _detect(
     sizes: dict[str, tuple[int, int]] = {}
 
     def read(shot: Shot) -> Image:
-        image = read_image(images.image_path(shot))
+        image = images.grey(shot)
         sizes[shot.name] = (image.shape[1], image.shape[0])
         return image
 

@@ -130,9 +130,9 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
     kind = ErrorKind(kind)
     random = np.random.default_rng([seed, zlib.crc32(kind.encode()), number])
     arm = simulated_arm()
-    pixel_sigma = _level(random, options.pixel_sigma_px)
+    pixel_sigma = log_uniform(random, options.pixel_sigma_px)
     calibrated = Camera(LENS, PARAMETERS, *SIZE_PX)
-    covariance = _calibration_covariance(random, calibrated, pixel_sigma, options)
+    covariance = calibration_covariance(random, calibrated, pixel_sigma, options)
     deviation = random.multivariate_normal(np.zeros(len(PARAMETERS)), covariance, method="cholesky")
     if kind is ErrorKind.WRONG_INTRINSICS:
         deviation *= options.intrinsics_factor
@@ -144,10 +144,10 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
     joints, camera_poses = _views(random, arm, true_camera, X, Y, count, options)
     if kind in MIXTURES:
         reported, read = arm.forward(joints), joints
-        true = _mixed(random, kind, arm, joints)
+        true = mixed_flange(random, kind, arm, joints)
         camera_poses = np.array([(X @ options.mounting.chain(Pose(pose)) @ Y).matrix for pose in true])
     else:
-        reported, read = _reported(random, kind, arm, joints, options)
+        reported, read = reported_poses(random, kind, arm, joints, options)
     views: list[View] = []
     target = options.target
     ids = np.arange(target.point_count)
@@ -180,16 +180,19 @@ def simulated_arm() -> Arm:
     return open_arm(ARM)
 
 
-def _level(random: np.random.Generator, bounds: tuple[float, float]) -> float:
+def log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> float:
+    """Draw a level between two bounds, evenly in its logarithm."""
     low, high = bounds
     return low * (high / low) ** random.uniform()
 
 
-def _in_camera(T_camera_target: FloatArray, target: Target) -> FloatArray:
+def points_in_camera(T_camera_target: FloatArray, target: Target) -> FloatArray:
+    """(P, 3) points of a target in the camera frame, metres."""
     return target.points @ T_camera_target[:3, :3].T + T_camera_target[:3, 3]
 
 
-def _twist(random: np.random.Generator, metres: float, degrees: float) -> FloatArray:
+def random_twist(random: np.random.Generator, metres: float, degrees: float) -> FloatArray:
+    """Draw a twist (6,) with these deviations per axis."""
     return np.concatenate([random.normal(0, metres, 3), random.normal(0, np.deg2rad(degrees), 3)])
 
 
@@ -202,21 +205,23 @@ def _look(down: FloatArray) -> FloatArray:
 
 def _mount(random: np.random.Generator, mounting: Mounting) -> tuple[Pose, Pose]:
     """Draw X and Y of the chain."""
-    jitter = Pose.exp(_twist(random, 0.05, 15.0)) @ Pose.exp([0, 0, 0, 0, 0, random.uniform(-np.pi, np.pi)])
+    jitter = Pose.exp(random_twist(random, 0.05, 15.0)) @ Pose.exp(
+        [0, 0, 0, 0, 0, random.uniform(-np.pi, np.pi)]
+    )
     if mounting is Mounting.EYE_IN_HAND:
         # The camera beside the tool, looking along it; the board flat on the table, its z axis down.
         T_flange_camera = Pose.exp([0.05, 0, 0.06, 0, 0, 0]) @ jitter
         at = np.array([random.uniform(0.35, 0.5), random.uniform(-0.15, 0.15), random.uniform(-0.35, -0.1)])
-        T_base_target = Pose(_look(at)) @ Pose.exp(_twist(random, 0.0, 5.0))
+        T_base_target = Pose(_look(at)) @ Pose.exp(random_twist(random, 0.0, 5.0))
         return T_flange_camera.inverse(), T_base_target
     # The camera above the table, looking down; the board on the flange, facing away from it.
     at = np.array([random.uniform(0.35, 0.5), random.uniform(-0.15, 0.15), random.uniform(0.9, 1.1)])
-    T_base_camera = Pose(_look(at)) @ Pose.exp(_twist(random, 0.0, 10.0))
+    T_base_camera = Pose(_look(at)) @ Pose.exp(random_twist(random, 0.0, 10.0))
     T_flange_target = Pose.exp([0, 0, 0.05, 0, 0, 0]) @ jitter @ Pose(_look(np.zeros(3)))
     return T_base_camera.inverse(), T_flange_target
 
 
-def _camera_pose(random: np.random.Generator, camera: Camera, options: CellOptions) -> FloatArray | None:
+def camera_pose(random: np.random.Generator, camera: Camera, options: CellOptions) -> FloatArray | None:
     """Draw `T_camera_target` (4, 4) such that the whole board is in the image; None if this draw is not."""
     tilt = np.deg2rad(random.uniform(*options.tilt_deg))
     azimuth = random.uniform(-np.pi, np.pi)
@@ -231,7 +236,7 @@ def _camera_pose(random: np.random.Generator, camera: Camera, options: CellOptio
     centre = options.target.points.mean(axis=0)
     aim = np.array([(u - cx) / fx, (v - cy) / fy, 1.0]) * distance
     pose[:3, 3] = aim - pose[:3, :3] @ centre
-    pixels, seen = _core.project(camera.lens, camera.parameters, _in_camera(pose, options.target))
+    pixels, seen = _core.project(camera.lens, camera.parameters, points_in_camera(pose, options.target))
     inside = (pixels >= MARGIN_PX) & (pixels <= np.array(SIZE_PX) - 1 - MARGIN_PX)
     return pose if seen.all() and inside.all() else None
 
@@ -249,11 +254,11 @@ def _views(
     joints: list[FloatArray] = []
     poses: list[FloatArray] = []
     for _ in range(MOST_ATTEMPTS):
-        drawn = [_camera_pose(random, camera, options) for _ in range(4 * count)]
+        drawn = [camera_pose(random, camera, options) for _ in range(4 * count)]
         seen = np.array([pose for pose in drawn if pose is not None]).reshape(-1, 4, 4)
         chain = X.inverse().matrix @ seen @ Y.inverse().matrix
         flange = inverses(chain) if options.mounting is Mounting.EYE_IN_HAND else chain
-        found, reached = arm.inverse_all(flange, _postures(arm, flange), attempts=1)
+        found, reached = arm.inverse_all(flange, postures_near(arm, flange), attempts=1)
         indices = [int(i) for i in np.flatnonzero(reached)]
         joints += [found[i] for i in indices]
         poses += [seen[i] for i in indices]
@@ -266,7 +271,7 @@ def _views(
     )
 
 
-def _postures(arm: Arm, flange: FloatArray) -> FloatArray:
+def postures_near(arm: Arm, flange: FloatArray) -> FloatArray:
     """Return postures (N, 6) near poses (N, 4, 4): the arm turned towards each, the last joint with it."""
     postures = np.tile(POSTURE_RAD, (len(flange), 1))
     x, y = arm.forward(POSTURE_RAD)[:2, 3]
@@ -276,14 +281,14 @@ def _postures(arm: Arm, flange: FloatArray) -> FloatArray:
     return np.arctan2(np.sin(postures), np.cos(postures))
 
 
-def _calibration_covariance(
+def calibration_covariance(
     random: np.random.Generator, camera: Camera, pixel_sigma: float, options: CellOptions
 ) -> FloatArray:
     """Covariance (n, n) that a calibration of the camera from views of the same board reaches."""
     information = np.zeros((len(camera.parameters),) * 2)
     count = 0
     while count < options.calibration_views:
-        pose = _camera_pose(random, camera, options)
+        pose = camera_pose(random, camera, options)
         if pose is None:
             continue
         information += camera_information(camera, options.target, pose)
@@ -293,7 +298,7 @@ def _calibration_covariance(
 
 def camera_information(camera: Camera, target: Target, T_camera_target: FloatArray) -> FloatArray:
     """(n, n) information about the camera's parameters in a view of unknown pose, at a noise of 1 px."""
-    points = _in_camera(T_camera_target, target)
+    points = points_in_camera(T_camera_target, target)
     _, in_point, in_parameters, _ = _core.project_jacobians(camera.lens, camera.parameters, points)
     in_pose = through_twist(points, in_point).reshape(-1, 6)
     in_camera = in_parameters.reshape(len(in_pose), -1)
@@ -321,7 +326,7 @@ def _field_root(points: FloatArray) -> FloatArray:
     return FIELD_PX * vectors * np.sqrt(np.maximum(values, 0))
 
 
-def _mixed(random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray) -> FloatArray:
+def mixed_flange(random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray) -> FloatArray:
     """Return where the flange (K, 4, 4) truly stands of an arm in which everything is wrong a little.
 
     Levels of the cell are those of an arm in good order; drawn ones are log-uniform over a decade about them.
@@ -345,7 +350,7 @@ def _mixed(random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: Float
             "pose_m": (0.005e-3, 0.1e-3),
             "pose_deg": (0.0005, 0.01),
         }
-        level = {name: _level(random, range_) for name, range_ in bounds.items()}
+        level = {name: log_uniform(random, range_) for name, range_ in bounds.items()}
     if kind is ErrorKind.MIXTURE_CELL_2:
         level = {name: 2 * value for name, value in level.items()}
     offsets = float(np.deg2rad(level["offset_deg"])) * random.standard_normal(len(arm))
@@ -355,36 +360,38 @@ def _mixed(random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: Float
     noise = float(np.deg2rad(level["encoder_deg"])) * random.standard_normal(joints.shape)
     play = 0.5 * float(np.deg2rad(level["play_deg"])) * np.sign(random.standard_normal(joints.shape))
     both = [
-        _core.se3_exp(np.array([_twist(random, level["pose_m"], level["pose_deg"]) for _ in joints]))
+        _core.se3_exp(np.array([random_twist(random, level["pose_m"], level["pose_deg"]) for _ in joints]))
         for _ in range(2)
     ]
     return both[0] @ built.forward(joints + offsets + noise - play) @ both[1]
 
 
-def _reported(
+def reported_poses(
     random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray, options: CellOptions
 ) -> tuple[FloatArray, FloatArray]:
     """`T_base_flange` (K, 4, 4) and joints (K, 6) as the robot reports them; it truly stands at `joints`."""
     true = arm.forward(joints)
     if kind in {ErrorKind.WHITE_FLANGE, ErrorKind.WHITE_BASE, ErrorKind.ROBOT_NOISE_1_DEG}:
-        degrees = 1.0 if kind is ErrorKind.ROBOT_NOISE_1_DEG else _level(random, options.rotation_sigma_deg)
+        degrees = (
+            1.0 if kind is ErrorKind.ROBOT_NOISE_1_DEG else log_uniform(random, options.rotation_sigma_deg)
+        )
         if options.translation_sigma_m is None:
-            metres = np.deg2rad(degrees) * _level(random, options.lever_m)
+            metres = np.deg2rad(degrees) * log_uniform(random, options.lever_m)
         else:
-            metres = _level(random, options.translation_sigma_m)
-        errors = _core.se3_exp(np.array([_twist(random, metres, degrees) for _ in joints]))
+            metres = log_uniform(random, options.translation_sigma_m)
+        errors = _core.se3_exp(np.array([random_twist(random, metres, degrees) for _ in joints]))
         return errors @ true if kind is ErrorKind.WHITE_BASE else true @ errors, joints
     if kind is ErrorKind.ENCODER:
-        sigma = np.deg2rad(_level(random, options.encoder_sigma_deg))
+        sigma = np.deg2rad(log_uniform(random, options.encoder_sigma_deg))
         read = joints + sigma * random.standard_normal(joints.shape)
         return arm.forward(read), read
     if kind is ErrorKind.JOINT_OFFSETS:
-        offsets = np.deg2rad(_level(random, options.offset_sigma_deg)) * random.standard_normal(6)
+        offsets = np.deg2rad(log_uniform(random, options.offset_sigma_deg)) * random.standard_normal(6)
         offsets[[0, 5]] = 0.0
         return arm.forward(joints + offsets), joints + offsets
     if kind is ErrorKind.SMOOTH_KINEMATIC:
-        metres = _level(random, options.length_sigma_m)
-        degrees = _level(random, options.twist_sigma_deg)
+        metres = log_uniform(random, options.length_sigma_m)
+        degrees = log_uniform(random, options.twist_sigma_deg)
         built = random_displacements(random, arm, metres, float(np.deg2rad(degrees)))
         return displaced(arm, built).forward(joints), joints
     return true, joints

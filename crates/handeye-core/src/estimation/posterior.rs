@@ -1,6 +1,6 @@
 //! From a cell to the answer: linearise, find the levels, move, and average over what the levels may be.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use super::cell::Cell;
 use super::component::Component;
@@ -73,6 +73,14 @@ pub struct Posterior {
     pub steps: usize,
     /// Whether poses and levels came to rest.
     pub converged: bool,
+}
+
+impl Posterior {
+    /// Degrees of freedom of the covariance of six linear combinations of the parameters.
+    #[must_use]
+    pub fn degrees_of_freedom_of(&self, combinations: &Matrix6xX<f64>) -> f64 {
+        degrees_of_freedom(&self.nodes, |all| combinations * all * combinations.transpose())
+    }
 }
 
 /// What a component of the error explains.
@@ -288,7 +296,9 @@ fn gather(
         covariance.ger(node.weight, &away, &away, 1.0);
     }
     covariance = (&covariance + covariance.transpose()) * 0.5;
-    let degrees_of_freedom = (0..cell.cameras.len()).map(|c| degrees_of_freedom(&nodes, 6 * c)).collect();
+    let degrees_of_freedom = (0..cell.cameras.len())
+        .map(|c| degrees_of_freedom(&nodes, |all| all.fixed_view::<6, 6>(6 * c, 6 * c).into_owned()))
+        .collect();
     let moved = guess.moved(theta.as_slice());
     let poses = 6 * (cell.cameras.len() + cell.targets.len());
     theta.rows_mut(0, poses).fill(0.0);
@@ -328,13 +338,14 @@ fn attribution(mixed: &Mixed, mode: &Mode, theta: &DVector<f64>) -> Result<Vec<A
 
 /// Degrees of freedom of a covariance that is known only so well: a scaled chi-square whose logarithm spreads as the
 /// sizes of the nodes' covariances do.
-fn degrees_of_freedom(nodes: &[Node], first: usize) -> f64 {
+fn degrees_of_freedom(nodes: &[Node], block: impl Fn(&DMatrix<f64>) -> Matrix6<f64>) -> f64 {
     let sizes: Vec<f64> = nodes
         .iter()
         .map(|node| {
-            let block = node.covariance.fixed_view::<6, 6>(first, first).into_owned();
             // In standard deviations, as metres and radians differ by orders.
-            block.cholesky().map_or(f64::NAN, |f| f.l_dirty().diagonal().map(f64::ln).sum() / 3.0)
+            block(&node.covariance)
+                .cholesky()
+                .map_or(f64::NAN, |f| f.l_dirty().diagonal().map(f64::ln).sum() / 3.0)
         })
         .collect();
     let usable = || nodes.iter().zip(&sizes).filter(|(_, s)| s.is_finite());

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from handeye.estimation.auto import MIRROR_RATIO
+from handeye.estimation.cell_fit import MIRROR_RATIO
 from handeye.estimation.measurements import Measurements, ViewPose
 from handeye.estimation.mistakes.sightings import centres, inverted, target_centre
 from handeye.types.arrays import FloatArray, IndexArray

@@ -1,0 +1,285 @@
+"""The one fit behind every estimate: all cameras and targets of a cell in one linear mixed model.
+
+One camera and one target are the simple case, and go the same way.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from handeye import _core
+from handeye.estimation.arm import ArmModel, velocities
+from handeye.estimation.camera_prior import CameraPrior, camera_prior
+from handeye.estimation.measurements import Measurements, ViewPose
+from handeye.estimation.rig_measurements import Pair, RigMeasurements
+from handeye.types.arrays import FloatArray
+from handeye.types.camera import Camera
+from handeye.types.kinematics import Kinematics
+from handeye.types.pose import Pose
+from handeye.types.rig import Body
+
+# No view's pixel noise is believed to be less. Even on rendered pictures corners err by a hundredth of a
+# pixel or so, much of it shared by neighbouring corners: such an error no number of points averages out.
+LEAST_PIXEL_SIGMA = 0.01
+# Degrees of freedom of the other views' pixel noise that a view's own is drawn to.
+PIXEL_PRIOR_DEGREES = 20.0
+# Pairs of nodes that the answer is averaged over.
+NODE_PAIRS = 16
+MOST_LINEARISATIONS = 8
+# A mirrored pose is looked at where it fits less than this many times worse than the best.
+MIRROR_RATIO = 8.0
+# Beyond this, in pixels anywhere in the image, what was measured through the camera is measured again.
+LARGEST_CAMERA_SHIFT_PX = 2.0
+MOST_CAMERAS = 4
+# Components of the error whose constants belong to the arm.
+OF_ARM = frozenset({"joint_offsets", "links"})
+
+Start = tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class PixelNoise:
+    """Deviation of the pixels of each view of a pair (K,), and the factor for what neighbours share."""
+
+    sigma_px: FloatArray
+    shared: float
+
+
+@dataclass(frozen=True, eq=False)
+class CellFit:
+    """What is believed of a cell, and where its parameters stand.
+
+    Parameters
+    ----------
+    measurements
+        As they were used: through the cameras of the priors, mirrored poses put right.
+    priors
+        What was believed of each camera.
+    pixels
+        Noise of the pixels of each pair.
+    arm
+        The arm, if it is known.
+    posterior
+        Of all parameters.
+    """
+
+    measurements: RigMeasurements
+    priors: Mapping[str, CameraPrior]
+    pixels: Mapping[Pair, PixelNoise]
+    arm: ArmModel | None
+    posterior: _core.Posterior
+
+    @cached_property
+    def X(self) -> dict[str, Pose]:
+        """X of each camera."""
+        return {name: Pose(x) for name, x in zip(self.measurements.cameras, self.posterior.x, strict=True)}
+
+    @cached_property
+    def Y(self) -> dict[str, Pose]:
+        """Y of each target."""
+        return {name: Pose(y) for name, y in zip(self.measurements.targets, self.posterior.y, strict=True)}
+
+    @cached_property
+    def theta(self) -> FloatArray:
+        """(n,) all parameters."""
+        return np.asarray(self.posterior.theta)
+
+    @cached_property
+    def cameras(self) -> dict[str, Camera]:
+        """The cameras as found."""
+        found: dict[str, Camera] = {}
+        for name, prior in self.priors.items():
+            parameters = np.array(prior.camera.parameters)
+            parameters[list(prior.free)] += self.theta[self.rows_of_camera(name)]
+            found[name] = Camera(prior.camera.lens, parameters, *prior.camera.size_px)
+        return found
+
+    def rows_of_x(self, camera: str) -> list[int]:
+        """Return where the twist of a camera's X stands among the parameters."""
+        first = 6 * list(self.measurements.cameras).index(camera)
+        return list(range(first, first + 6))
+
+    def rows_of_y(self, target: str) -> list[int]:
+        """Return where the twist of a target's Y stands."""
+        first = 6 * (len(self.measurements.cameras) + list(self.measurements.targets).index(target))
+        return list(range(first, first + 6))
+
+    def rows_of_camera(self, camera: str) -> list[int]:
+        """Return where the free parameters of a camera stand."""
+        first = 6 * (len(self.measurements.cameras) + len(self.measurements.targets))
+        for name, prior in self.priors.items():
+            if name == camera:
+                break
+            first += len(prior.free)
+        return list(range(first, first + len(self.priors[camera].free)))
+
+    def row_of_board(self, target: str) -> int:
+        """Return where the scale of a target stands."""
+        free = sum(len(prior.free) for prior in self.priors.values())
+        poses = 6 * (len(self.measurements.cameras) + len(self.measurements.targets))
+        return poses + free + list(self.measurements.targets).index(target)
+
+    @cached_property
+    def rows_of_arm(self) -> list[int]:
+        """Where the constants of the arm stand."""
+        return [i for name, a, b in self.posterior.constants if name in OF_ARM for i in range(a, b)]
+
+
+def fit_cell(
+    measurements: RigMeasurements,
+    kinematics: Kinematics | None = None,
+    *,
+    camera_fixed: bool = False,
+    start: Start | None = None,
+) -> CellFit:
+    """Fit everything in a cell to its measurements.
+
+    Parameters
+    ----------
+    measurements
+        Of every pair of camera and target.
+    kinematics
+        The arm, if it is known; every station must then have joint positions.
+    camera_fixed
+        Whether the cameras are held as they are given.
+    start
+        X (C, 4, 4) and Y (T, 4, 4) to try among other starts.
+
+    Raises
+    ------
+    InputError
+        Views without the joint positions that the arm needs, or a camera that nothing ties to the arm.
+    """
+    priors = {
+        name: camera_prior(one.camera, fixed=camera_fixed) for name, one in measurements.cameras.items()
+    }
+    changed = {
+        name: prior.camera
+        for name, prior in priors.items()
+        if prior.camera is not measurements.cameras[name].camera
+    }
+    if changed:
+        measurements = measurements.through(changed)
+    arm = None if kinematics is None else ArmModel.of(kinematics)
+    fit = _once(measurements, priors, arm, start)
+    for _ in range(MOST_CAMERAS):
+        moved = {
+            name: camera
+            for name, camera in fit.cameras.items()
+            if not _largest_shift_px(priors[name].camera, camera) < LARGEST_CAMERA_SHIFT_PX
+        }
+        if not moved:
+            break
+        measurements = measurements.through(moved)
+        priors = {
+            name: prior.moved(moved[name]) if name in moved else prior for name, prior in priors.items()
+        }
+        fit = _once(measurements, priors, arm, _start(fit))
+    unmirrored = {
+        (camera, target): put_right
+        for (camera, target), measured in measurements.pairs.items()
+        if (put_right := prefer_consistent_poses(measured, fit.X[camera], fit.Y[target])) is not None
+    }
+    return fit if not unmirrored else _once(measurements.with_pairs(unmirrored), priors, arm, _start(fit))
+
+
+def _start(fit: CellFit) -> Start:
+    return np.asarray(fit.posterior.x), np.asarray(fit.posterior.y)
+
+
+def _once(
+    measurements: RigMeasurements,
+    priors: Mapping[str, CameraPrior],
+    arm: ArmModel | None,
+    start: Start | None,
+) -> CellFit:
+    whole = measurements.whole
+    if arm is not None:
+        arm.check(whole)
+    place = {view.name: k for k, view in enumerate(measurements.stations)}
+    camera_of = {name: i for i, name in enumerate(measurements.cameras)}
+    target_of = {name: i for i, name in enumerate(measurements.targets)}
+    pixels: dict[Pair, PixelNoise] = {}
+    seen: list[tuple[int, int, _core.PoseMeasurements, list[int], list[float]]] = []
+    for (camera, target), measured in measurements.pairs.items():
+        if len(measured) == 0:
+            continue
+        poses = _core.PoseMeasurements(
+            measured.problem,
+            measured.camera_poses,
+            free_camera=list(priors[camera].free) or None,
+            board_scale=True,
+            sigmas_px=[
+                None if view.sigmas_px is None else np.hypot(view.sigmas_px, LEAST_PIXEL_SIGMA)
+                for view in measured.views
+            ],
+        )
+        variances = poses.shrunk_variances(prior_degrees=PIXEL_PRIOR_DEGREES, floor_px2=LEAST_PIXEL_SIGMA**2)
+        shared = poses.shared_error(variances)
+        pixels[camera, target] = PixelNoise(np.sqrt(variances), float(np.sqrt(shared)))
+        at = [place[view.name] for view in measured.views]
+        widened = [shared * variance for variance in variances]
+        seen.append((camera_of[camera], target_of[target], poses, at, widened))
+    of_arm = None
+    if arm is not None:
+        by_joint, by_link = arm.at_flange(whole.joints)
+        of_arm = (by_joint, by_link, arm.scales.tolist(), list(arm.free), list(arm.lengths))
+    cameras = [
+        (
+            measurements.cameras[name].body is Body.FLANGE,
+            len(prior.free),
+            prior.from_these_pixels,
+            (prior.information, prior.mean, prior.inflated) if prior.free else None,
+        )
+        for name, prior in priors.items()
+    ]
+    posterior = _core.estimate_cell(
+        np.array([view.T_base_flange.matrix for view in measurements.stations]),
+        cameras,
+        [one.body is Body.FLANGE for one in measurements.targets.values()],
+        seen,
+        velocities=velocities(whole),
+        arm=of_arm,
+        board_scale=True,
+        start=start,
+        pairs=NODE_PAIRS,
+        most_rounds=MOST_LINEARISATIONS,
+    )
+    return CellFit(measurements, priors, pixels, arm, posterior)
+
+
+def _largest_shift_px(before: Camera, after: Camera) -> float:
+    """How far pixels move between two cameras of one lens, at most over a grid of rays in the image."""
+    width, height = before.size_px
+    u, v = np.meshgrid(np.linspace(0, width - 1, 7), np.linspace(0, height - 1, 7))
+    fx, fy, cx, cy = before.parameters[:4]
+    rays = np.stack([(u.ravel() - cx) / fx, (v.ravel() - cy) / fy, np.ones(u.size)], axis=1)
+    first, seen = before.project(rays)
+    second, still = after.project(rays)
+    both = seen & still
+    if not both.any():
+        return float("inf")
+    return float(np.linalg.norm((second - first)[both], axis=1).max())
+
+
+def prefer_consistent_poses(measurements: Measurements, X: Pose, Y: Pose) -> Measurements | None:
+    """Return the measurements with mirrored poses where the chain agrees better with them; None if nowhere.
+
+    A plane seen from afar has two poses that fit almost equally; the other views decide.
+    """
+    poses: list[ViewPose] = []
+    changed = False
+    predicted = X.matrix @ measurements.motions @ Y.matrix
+    for pose, chain in zip(measurements.poses, predicted, strict=True):
+        other = pose.mirrored
+        if other is not None and pose.ambiguity_ratio < MIRROR_RATIO:
+            to_chain = Pose(chain).inverse()
+            if (to_chain @ other[0]).rotation_angle_rad < (
+                to_chain @ pose.T_camera_target
+            ).rotation_angle_rad:
+                pose = ViewPose(other[0], other[1], pose.information, (pose.T_camera_target, pose.rmse_px))  # noqa: PLW2901
+                changed = True
+        poses.append(pose)
+    return replace(measurements, poses=tuple(poses)) if changed else None
