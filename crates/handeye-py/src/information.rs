@@ -302,7 +302,10 @@ impl Predictor {
         arm: Option<ArmOfCandidates<'py>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let n = self.model().parameter_count();
-        let all = self.looked(py, &motions, arm.as_ref(), CandidateModel::informations)?;
+        let all = self.looked(py, &motions, arm.as_ref(), |model, motions, arm| {
+            let model: &CandidateModel<'_> = model;
+            model.informations(motions, arm)
+        })?;
         Ok(convert::dynamics_out(py, &all, n, n))
     }
 }

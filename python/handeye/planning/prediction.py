@@ -90,12 +90,10 @@ class Prediction:
             (N, n) joint positions of the candidates, if the arm is known. Without them constants of the arm
             are taken as if they moved nothing.
         """
-        if self.estimate.arm is None or joints is None:
-            return self._predictor.gains(self._belief, criterion, motions)
-        # What the arm does is asked only where the target would be in sight.
+        # What the arm does and what a view tells of the camera is asked only where the target would be in sight.
         gains = np.full(len(motions), np.nan)
         seen = np.flatnonzero(self._predictor.in_sight(motions))
-        arm = self._arm(joints[seen])
+        arm = self._arm(None if joints is None else joints[seen])
         gains[seen] = self._predictor.gains(self._belief, criterion, motions[seen], arm=arm)
         return gains
 

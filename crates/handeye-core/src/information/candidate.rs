@@ -341,7 +341,7 @@ impl Default for Execution {
 }
 
 /// Candidates below which waking a second thread costs more than it brings.
-const CANDIDATES_PER_THREAD: usize = 10_000;
+const CANDIDATES_PER_THREAD: usize = 2_500;
 
 impl Execution {
     pub(super) fn threads_for(&self, candidates: usize) -> usize {

@@ -124,9 +124,7 @@ impl Entropies {
         let without = match (of, robot.is_none() && !arm.noisy) {
             (EntropyOf::Everything, true) => None,
             // The robot's error moves the twist alone.
-            (EntropyOf::Everything, false) => {
-                Some(if arm.noisy { robot_only(pixel_parameters, x, robot, arm) } else { noise.form(6) })
-            }
+            (EntropyOf::Everything, false) => Some(robot_only(0, x, robot, arm)),
             (EntropyOf::HandEye, _) => {
                 let n = belief.len() - 6;
                 let nuisance = belief.information().view((6, 6), (n, n)).into_owned();

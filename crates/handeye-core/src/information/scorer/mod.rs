@@ -20,7 +20,7 @@ mod wide_algebra;
 mod wide_points;
 mod window;
 
-use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3};
 
 use self::algebra::{Determinant, Gains};
 use self::approach::{Approach, MATRIX};
@@ -175,21 +175,29 @@ impl<'a> Scorer<'a> {
     /// Puts what the arm's errors move into the camera frame.
     fn attach(&self, arm: &ArmColumns<'_>, block: &mut Block) {
         let to_camera = self.model.x.adjoint();
+        let fewest = self.model.visibility.fewest.max(1) as f64;
         let (constants, noise) = arm.counts;
+        let mut moved = vec![0.0; constants.max(noise)];
         for (first, entries, count) in [(0, arm.constants, constants), (constants, arm.noise, noise)] {
             if count == 0 {
                 continue;
             }
-            let fewest = self.model.visibility.fewest.max(1) as f64;
             for (lane, entries) in entries.chunks_exact(6 * count).enumerate() {
                 if block.seen[lane] < fewest {
                     continue;
                 }
-                for j in 0..count {
-                    let column = Vector6::from_fn(|i, _| entries[i * count + j]);
-                    let moved = to_camera * column;
-                    for i in 0..6 {
-                        block.arm[6 * (first + j) + i][lane] = moved[i];
+                for i in 0..6 {
+                    let moved = &mut moved[..count];
+                    moved.fill(0.0);
+                    for (k, row) in entries.chunks_exact(count).enumerate() {
+                        let factor = to_camera[(i, k)];
+                        for (to, from) in moved.iter_mut().zip(row) {
+                            *to += factor * from;
+                        }
+                    }
+                    let rows = block.arm[6 * first..].iter_mut().skip(i).step_by(6);
+                    for (row, moved) in rows.zip(moved.iter()) {
+                        row[lane] = *moved;
                     }
                 }
             }
@@ -335,10 +343,11 @@ impl<'a> Scorer<'a> {
     }
 
     fn take(&self, scale: f64, form: &Form, block: &Block, outcome: Outcome<'_>) {
+        let rows = self.size();
         if form.size <= 12 {
-            dispatch(self.unit, Wide::<12, 78> { scale, form, block, outcome });
+            dispatch(self.unit, Wide::<12, 78> { scale, form, rows, block, outcome });
         } else {
-            dispatch(self.unit, Wide::<23, 276> { scale, form, block, outcome });
+            dispatch(self.unit, Wide::<23, 276> { scale, form, rows, block, outcome });
         }
     }
 }

@@ -24,6 +24,8 @@ pub(super) enum Outcome<'a> {
 pub(super) struct Wide<'a, const CAPACITY: usize, const PACKED: usize> {
     pub scale: f64,
     pub form: &'a Form,
+    /// Rows of the information in the block, of which the form's come first.
+    pub rows: usize,
     pub block: &'a Block,
     pub outcome: Outcome<'a>,
 }
@@ -49,8 +51,13 @@ impl<const CAPACITY: usize, const PACKED: usize> Kernel for Wide<'_, CAPACITY, P
         };
         let mut observed_rows = [[zero; CAPACITY]; ROWS];
         for at in (0..BLOCK).step_by(S::LANES) {
-            for (to, from) in work.information.iter_mut().zip(self.block.information.iter()) {
-                *to = simd.load(&from[at..]) * scale;
+            let mut place = 0;
+            for i in 0..size {
+                let line = &self.block.information[packed(self.rows, i, i)..][..size - i];
+                for from in line {
+                    work.information[place] = simd.load(&from[at..]) * scale;
+                    place += 1;
+                }
             }
             for (to, from) in work.covariance.iter_mut().zip(&self.form.constant) {
                 *to = simd.splat(*from);
@@ -148,43 +155,49 @@ fn add_arm<S: Simd>(
     size: usize,
     covariance: &mut [S::Vector],
 ) {
-    let moved = |column: usize| {
-        let rows = &block.arm[6 * column..6 * column + 6];
-        [0, 1, 2, 3, 4, 5].map(|i: usize| simd.load(&rows[i][at..]))
-    };
-    let mut square = [simd.splat(0.0); UPPER];
-    let add = |u: &[S::Vector; 6], square: &mut [S::Vector; UPPER]| {
-        for i in 0..6 {
-            for j in i..6 {
-                square[upper(i, j)] = u[i].mul_add(u[j], square[upper(i, j)]);
-            }
-        }
-    };
+    let zero = simd.splat(0.0);
+    let mut square = [zero; UPPER];
+    let mut u = [zero; 6];
     for (j, column) in arm.columns.iter().enumerate() {
-        let mut u = column.of_x.map(|x| simd.splat(x));
+        for i in 0..6 {
+            u[i] = simd.splat(column.of_x[i]);
+        }
         add_turned(simd, &column.of_y, before_y, &mut u);
-        for (l, row) in arm.root.iter().enumerate().skip(j) {
+        for (row, moved) in arm.root.iter().zip(block.arm.chunks_exact(6)).skip(j) {
             let factor = simd.splat(row[j]);
-            for (u, e) in u.iter_mut().zip(moved(l)) {
-                *u = e.mul_add(factor, *u);
+            for i in 0..6 {
+                u[i] = simd.load(&moved[i][at..]).mul_add(factor, u[i]);
             }
         }
-        add(&u, &mut square);
-        for (i, u) in u.iter().enumerate() {
-            let row = &mut covariance[packed(size, i, 6.min(size - 1))..][..size - 6];
-            for (entry, pixel) in row.iter_mut().zip(&column.pixel) {
-                *entry = u.mul_add(simd.splat(*pixel), *entry);
+        add_outer(&u, &mut square);
+        for i in 0..6 {
+            let first = packed(size, i, 5) + 1;
+            for (entry, pixel) in covariance[first..].iter_mut().zip(&column.pixel) {
+                *entry = u[i].mul_add(simd.splat(*pixel), *entry);
             }
         }
     }
-    let (constants, noise) = block.arm_counts;
-    for column in constants..constants + noise {
-        add(&moved(column), &mut square);
+    let (constants, _) = block.arm_counts;
+    for moved in block.arm.chunks_exact(6).skip(constants) {
+        for i in 0..6 {
+            u[i] = simd.load(&moved[i][at..]);
+        }
+        add_outer(&u, &mut square);
     }
     for i in 0..6 {
         for j in i..6 {
             let entry = &mut covariance[packed(size, i, j)];
             *entry = *entry + square[upper(i, j)];
+        }
+    }
+}
+
+/// Adds `u u'`.
+#[inline(always)]
+fn add_outer<V: Vector>(u: &[V; 6], square: &mut [V; UPPER]) {
+    for i in 0..6 {
+        for j in i..6 {
+            square[upper(i, j)] = u[i].mul_add(u[j], square[upper(i, j)]);
         }
     }
 }
