@@ -324,7 +324,11 @@ class Belief:
     def hand_eye_entropy(self) -> float: ...
 
 class Criterion:
-    """What a view is worth: entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue or tool_point."""
+    """Worth of a view: entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue, tool_point or task.
+
+    `tasks` (P, d, n): rows over all parameters. A view is worth what it takes off the root mean square of the
+    tasks' summed variances.
+    """
 
     def __init__(
         self,
@@ -334,6 +338,7 @@ class Criterion:
         angle_scale_rad: float = 1e-3,
         tool_points: ArrayLike | None = None,
         over: str = "mean",
+        tasks: ArrayLike | None = None,
     ) -> None: ...
     @property
     def name(self) -> str: ...
@@ -445,6 +450,8 @@ class Posterior:
     def level_names(self) -> list[str]: ...
     @property
     def levels(self) -> list[list[float]]: ...
+    @property
+    def weights(self) -> list[float]: ...
     @property
     def degrees_of_freedom(self) -> list[float]: ...
     def degrees_of_freedom_of(self, combinations: ArrayLike) -> list[float]:

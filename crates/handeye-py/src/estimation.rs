@@ -337,6 +337,12 @@ impl Posterior {
         self.inner.nodes.iter().map(|node| node.levels.clone()).collect()
     }
 
+    /// Share of each node (N,).
+    #[getter]
+    fn weights(&self) -> Vec<f64> {
+        self.inner.nodes.iter().map(|node| node.weight).collect()
+    }
+
     /// Degrees of freedom of the covariance of each `X`.
     #[getter]
     fn degrees_of_freedom(&self) -> Vec<f64> {

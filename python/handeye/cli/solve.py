@@ -1,5 +1,6 @@
 """`handeye solve`: the answer for a folder of views."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -7,14 +8,22 @@ import numpy as np
 
 from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
+from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
+from handeye.cli.page import Page, serve, show_views
 from handeye.cli.solve_poses import answer_for_poses
+from handeye.cli.solve_rig import answer_for_rig
 from handeye.cli.source import Source, mindful_of
+from handeye.cli.work import WorkOptions, touch_lines
 from handeye.datasets import PosePairs
+from handeye.estimation import Measurements, make_estimator
 from handeye.estimation import solve as solve_recording
+from handeye.estimation.certificate import Certificate, certify_calibration
 from handeye.estimation.confidence import Ellipsoid, position_region, within
-from handeye.importing import Opened
+from handeye.estimation.mistakes import examine
+from handeye.importing import Opened, is_rig
+from handeye.robots import ArmKinematics
 from handeye.types.calibration import Calibration, JointOffset, ModelName, RobotSide
 
 if TYPE_CHECKING:
@@ -28,9 +37,12 @@ def solve(
     model: ModelName = ModelName.AUTO,
     reduced: bool = False,
     camera_fixed: bool = False,
+    certify: bool = False,
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
+    work: WorkOptions = WorkOptions(),  # noqa: B008 - frozen
+    page: Page = Page(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Calibrate from a folder of views.
@@ -43,30 +55,66 @@ def solve(
     Parameters
     ----------
     folder
-        Folder with the views, or a file of samples of easy_handeye2 or MoveIt.
+        Folder with the views or with a folder for each camera, or a file of samples of easy_handeye2 or
+        MoveIt.
     model
         auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
     reduced
         Answer even where the views leave directions open, such as for an arm with four axes.
     camera_fixed
         Hold the camera as it is given. Else its parameters are found again within what is known of them.
+    certify
+        Bound from below how well any other answer could fit the poses, and say whether this is the best.
     output
         Also write the JSON object to this file.
     """
     check_output(output)
+    if is_rig(folder):
+        if certify or page.ui:
+            raise UsageError("--certify and --ui take one camera", hint="leave them out for several")
+        rig = source.open_rig(folder)
+        views = [station.views[0].view for station in rig.recording.stations]
+        return answer_for_rig(
+            rig,
+            model,
+            output,
+            reduced=reduced,
+            kinematics=arm.kinematics(views, model),
+            camera_fixed=camera_fixed,
+        )
     opened = source.open_any(folder, arm.described())
     if isinstance(opened, PosePairs):
         return answer_for_poses(opened, output)
     with mindful_of(opened.warnings):
-        kinematics = arm.kinematics(opened.recording, model)
+        kinematics = arm.kinematics(opened.recording.views, model)
         calibration = solve_recording(
-            opened.recording, model, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed
+            opened.recording,
+            model,
+            reduced=reduced,
+            kinematics=kinematics,
+            camera_fixed=camera_fixed,
+            work=work.work(),
         )
     region = position_region(calibration)
     data = _data(opened, calibration, region)
+    certificate = certify_calibration(opened.recording, calibration) if certify else None
+    if certificate is not None:
+        data["certificate"] = certificate.to_dict()
     if output is not None:
         write_json(output, data)
-    return Answer(data, lambda console: _show(console, opened, calibration, region, output))
+    after = None if not page.ui else partial(_page, page, opened, model, kinematics, arm.robot)
+    return Answer(
+        data, lambda console: _show(console, opened, calibration, region, certificate, output), after
+    )
+
+
+def _page(
+    page: Page, opened: Opened, model: ModelName, kinematics: ArmKinematics | None, description: str | None
+) -> None:
+    measurements = examine(Measurements.of_recording(opened.recording)).measurements
+    estimate = make_estimator(model, kinematics)(measurements)
+    known = None if kinematics is None else kinematics.arm
+    serve(show_views(page, opened, measurements, estimate, arm=known, description=description))
 
 
 def _data(opened: Opened, calibration: Calibration, region: Ellipsoid) -> dict[str, Any]:
@@ -86,7 +134,12 @@ def _data(opened: Opened, calibration: Calibration, region: Ellipsoid) -> dict[s
 
 
 def _show(
-    console: "Console", opened: Opened, calibration: Calibration, region: Ellipsoid, output: Path | None
+    console: "Console",
+    opened: Opened,
+    calibration: Calibration,
+    region: Ellipsoid,
+    certificate: Certificate | None,
+    output: Path | None,
 ) -> None:
     from handeye.cli.wording import (  # noqa: PLC0415 - a program reading JSON need not wait for it
         MOUNTINGS,
@@ -136,11 +189,13 @@ def _show(
             ("accuracy", f"{stated} with 95 % probability (centre of the camera, rotation)"),
             ("standard deviation", f"{accuracy} of position and rotation"),
             ("95 % ellipsoid", f"of the position, semi-axes {axes} mm"),
+            *(() if calibration.touch is None else touch_lines(calibration.touch)),
             ("residuals", residuals),
             ("noise", _noise(calibration)),
             *((f"joint {offset.joint}", _offset(offset)) for offset in calibration.joint_offsets),
             ("camera", camera_line(opened)),
             *([] if opened.timing is None else [("timing", str(opened.timing))]),
+            *([] if certificate is None else [("certificate", certificate.sentence)]),
         ],
     )
     notices(console, "Left out", (f"{name}: {why}" for name, why in left_out.items()))

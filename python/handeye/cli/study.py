@@ -31,12 +31,25 @@ study = App(
 )
 # Imported when it runs.
 study.command(
+    "handeye.cli.study_touch:touch", name="touch", help="Count how often the tool lands where it is said to."
+)
+study.command(
     "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
 )
 study.command(
     "handeye.cli.study_methods:methods",
     name="methods",
     help="Compare every method on the same simulated cells.",
+)
+study.command(
+    "handeye.cli.study_policies:policies",
+    name="policies",
+    help="Compare policies in the same cells at equal budget.",
+)
+study.command(
+    "handeye.cli.study_policies:gains",
+    name="gains",
+    help="Tell what gains are worth, apart from noise.",
 )
 
 

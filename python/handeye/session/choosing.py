@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from handeye.estimation import Estimate
+from handeye.estimation.estimate import answering
 from handeye.planning import Planner, PlannerOptions, Stop, StopReason
 from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import ViewLimits
@@ -17,7 +18,15 @@ from handeye.planning.solids import SolidLinks
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
-from handeye.session.deciding import EndReason, Halt, Situation, Step, decision_of, estimator_of, halt_of
+from handeye.session.deciding import (
+    Considered,
+    EndReason,
+    Halt,
+    Situation,
+    Step,
+    decision_of,
+    halt_of,
+)
 from handeye.session.entry import TRANSIENT, Entry, Failure
 from handeye.session.starting import Start, starting_goal
 from handeye.session.wish import Wish
@@ -146,6 +155,7 @@ class ArmChooser:
         drawn = self._generator.draw(estimate, postures, random, shunned=shunned)
         options = PlannerOptions(
             policy=self._wish.policy,
+            criterion=self._wish.criterion(estimate, situation.measurements),
             stop_rules=self._wish.rules(),
             sight=drawn.sight,
             seed=self._wish.seed,
@@ -154,7 +164,7 @@ class ArmChooser:
                 np.minimum(self._arm.velocities, self._wish.speed_rad_s),
             ),
         )
-        planner = Planner(situation.measurements, drawn.pool, estimator_of(estimate), options)
+        planner = Planner(situation.measurements, drawn.pool, answering(estimate), options)
         turned_down = dict(drawn.turned_down)
         joints_of = dict(drawn.joints)
         answer = planner.ask()
@@ -180,7 +190,12 @@ class ArmChooser:
                     more["refined"] = climbed[name]
                 pose = answer.candidate.T_base_flange
                 goal = self._goal(situation, pose, tuple(joints_of[name].tolist()))
-                return Step(goal, "plan", decision_of(answer, estimate, more), estimate)
+                considered = Considered(
+                    planner.pool, planner.gains(), self._arm.forward(drawn.ruled_out), drawn.reasons
+                )
+                return Step(
+                    goal, "plan", decision_of(answer, estimate, more), estimate, considered=considered
+                )
             turned_down[f"on the way: {why}"] = turned_down.get(f"on the way: {why}", 0) + 1
             planner.give_up(name)
             answer = planner.ask()

@@ -5,18 +5,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from handeye.estimation import Estimate
+from handeye.estimation.estimate import answering
 from handeye.planning import Planner, PlannerOptions, Pool, Stop
 from handeye.planning.prediction import Sight
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics, arm_kinematics
 from handeye.robots.protocol import Goal
 from handeye.session.deciding import (
+    Considered,
     EndReason,
     Halt,
     Situation,
     Step,
     decision_of,
-    estimator_of,
     halt_of,
 )
 from handeye.session.wish import Wish
@@ -73,12 +74,13 @@ class RecordedChooser:
         pool = Pool.of_views(left)
         options = PlannerOptions(
             policy=self._wish.policy,
+            criterion=self._wish.criterion(estimate, situation.measurements),
             stop_rules=self._wish.rules(),
             sight=Sight(known=True),
             seed=self._wish.seed,
             travel=self._travel(situation, pool),
         )
-        planner = Planner(situation.measurements, pool, estimator_of(estimate), options)
+        planner = Planner(situation.measurements, pool, answering(estimate), options)
         answer = planner.ask()
         if isinstance(answer, Stop):
             halt = halt_of(answer)
@@ -86,7 +88,10 @@ class RecordedChooser:
                 return halt
             return Halt(halt.reason, f"none of the {len(self._views)} recorded views is left")
         view = next(view for view in left if view.name == answer.candidate.name)
-        return Step(self._goal(view), "plan", decision_of(answer, estimate, {}), estimate)
+        considered = Considered(planner.pool, planner.gains())
+        return Step(
+            self._goal(view), "plan", decision_of(answer, estimate, {}), estimate, considered=considered
+        )
 
     def _goal(self, view: View) -> Goal:
         return Goal(f"{view.name}.1", view.T_base_flange, view.joints_rad, self._wish.speed_rad_s)
