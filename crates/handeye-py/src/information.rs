@@ -9,6 +9,7 @@ use handeye_core::information::{
 };
 use handeye_core::least_squares::PixelParameters;
 use handeye_core::simd::VectorUnit;
+use nalgebra::DMatrix;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
