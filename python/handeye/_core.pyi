@@ -28,8 +28,8 @@ def nearest_rigid(T: ArrayLike) -> NDArray[float64]:
 
 # Cameras
 
-def lens_parameter_count(lens: str) -> int:
-    """Number of parameters of a lens, focal lengths and principal point included."""
+def lenses() -> list[tuple[str, list[str]]]:
+    """Every lens, and the names of its coefficients after `fx, fy, cx, cy`."""
 
 def project(
     lens: str, parameters: ArrayLike, points_camera: ArrayLike

@@ -18,7 +18,7 @@ VIEWS = (8, 30)
 
 
 def bench_default(options: Options, progress: Progress) -> dict[str, Any]:
-    """Return times of the default estimate, the arm described and not, and of solving the shipped recording."""
+    """Return times of the default estimate, arm described and not, and of solving the shipped recording."""
     kinematics = ArmKinematics(simulated_arm())
     methods: dict[str, Callable[[], object]] = {}
     for views in VIEWS[: 1 if options.quick else None]:

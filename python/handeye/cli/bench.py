@@ -27,7 +27,7 @@ def bench(
     output: Path | None = None,
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
-    """Measure solver, default model, scorer, a planning step and a step of the loop, side by side with their peers.
+    """Measure solver, default model, scorer, planning and a step of the loop, side by side with peers.
 
     All methods get the same problems and take turns in one run. Peers that are not installed are left out,
     and it is said why; requirements/bench.txt brings SciPy, JAX, Ceres and GTSAM for Python and the headers

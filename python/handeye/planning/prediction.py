@@ -90,7 +90,7 @@ class Prediction:
             (N, n) joint positions of the candidates, if the arm is known. Without them constants of the arm
             are taken as if they moved nothing.
         """
-        # What the arm does and what a view tells of the camera is asked only where the target would be in sight.
+        # What the arm does, and what a view tells of the camera, is asked only where it shows the target.
         gains = np.full(len(motions), np.nan)
         seen = np.flatnonzero(self._predictor.in_sight(motions))
         arm = self._arm(None if joints is None else joints[seen])

@@ -176,8 +176,8 @@ class Arm:
     ) -> FloatArray:
         """(..., 6, m) twists of the flange where joints sit displaced on the link before them, at (..., n).
 
-        Way w displaces joint ``which[w]`` by ``twists[w]`` (m, 6), metres and radians in the joint's own frame
-        before it moves; frames as of `jacobian`.
+        Way w displaces joint ``which[w]`` by ``twists[w]`` (m, 6), metres and radians in the joint's own
+        frame before it moves; frames as of `jacobian`.
 
         Raises
         ------

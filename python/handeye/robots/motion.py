@@ -112,7 +112,7 @@ class ArmKinematics:
 
 def _seen_from(T: Pose, twists: FloatArray) -> FloatArray:
     """Carry twists (K, 6, m) through a transform that is the same for all."""
-    if T == Pose.identity():
+    if Pose.identity() == T:
         return twists
     return np.asarray(np.einsum("ij,kjm->kim", T.adjoint(), twists, optimize=True))
 

@@ -98,8 +98,7 @@ impl<'a> Scorer<'a> {
     }
 
     fn without_goal(model: &'a CandidateModel<'a>, unit: VectorUnit) -> Self {
-        let target =
-            if model.camera.lens == Lens::KannalaBrandt { None } else { Target::new(model.features) };
+        let target = if model.camera.lens.in_lanes() { Target::new(model.features) } else { None };
         Self {
             model,
             x: entries(&model.x),
@@ -243,19 +242,20 @@ impl<'a> Scorer<'a> {
                 dispatch(self.unit, WidePoints::<$($flag),*> { parameters, columns, window, target, block })
             }};
         }
-        let distorts = !matches!(self.model.camera.lens, Lens::Pinhole | Lens::KannalaBrandt);
+        let distorts = self.model.camera.lens != Lens::Pinhole;
         if !distorts && self.inform_of_plane(window, target, block) {
             return;
         }
         match (self.model.camera.lens, self.columns.is_empty()) {
-            (Lens::Pinhole | Lens::KannalaBrandt, false) => see_wide!(false, false, false),
-            (Lens::Pinhole | Lens::KannalaBrandt | Lens::BrownConrady4 | Lens::BrownConrady5, true) => {
+            (Lens::Pinhole, false) => see_wide!(false, false, false),
+            (Lens::Pinhole | Lens::BrownConrady4 | Lens::BrownConrady5, true) => {
                 see!(Distorted, false, false);
             }
             (Lens::BrownConrady4 | Lens::BrownConrady5, false) => see_wide!(true, false, false),
             (Lens::BrownConrady8, true) => see!(Distorted, true, false),
             (Lens::BrownConrady12, true) => see!(Distorted, true, true),
             (Lens::BrownConrady8 | Lens::BrownConrady12, false) => see_wide!(true, true, true),
+            _ => unreachable!("other lenses go feature by feature"),
         }
     }
 

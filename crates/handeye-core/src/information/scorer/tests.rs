@@ -21,6 +21,7 @@ fn camera(lens: Lens) -> Camera {
     let fisheye = [500.0, 490.0, 630.0, 520.0, 0.01, -0.02, 0.003, -0.001];
     match lens {
         Lens::KannalaBrandt => Camera::new(lens, &fisheye).unwrap(),
+        Lens::Division => Camera::new(lens, &all[..5]).unwrap(),
         _ => Camera::new(lens, &all[..lens.parameter_count()]).unwrap(),
     }
 }

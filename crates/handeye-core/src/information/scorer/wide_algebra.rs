@@ -159,28 +159,28 @@ fn add_arm<S: Simd>(
     let mut square = [zero; UPPER];
     let mut u = [zero; 6];
     for (j, column) in arm.columns.iter().enumerate() {
-        for i in 0..6 {
-            u[i] = simd.splat(column.of_x[i]);
+        for (u, x) in u.iter_mut().zip(&column.of_x) {
+            *u = simd.splat(*x);
         }
         add_turned(simd, &column.of_y, before_y, &mut u);
         for (row, moved) in arm.root.iter().zip(block.arm.chunks_exact(6)).skip(j) {
             let factor = simd.splat(row[j]);
-            for i in 0..6 {
-                u[i] = simd.load(&moved[i][at..]).mul_add(factor, u[i]);
+            for (u, moved) in u.iter_mut().zip(moved) {
+                *u = simd.load(&moved[at..]).mul_add(factor, *u);
             }
         }
         add_outer(&u, &mut square);
-        for i in 0..6 {
+        for (i, u) in u.iter().enumerate() {
             let first = packed(size, i, 5) + 1;
             for (entry, pixel) in covariance[first..].iter_mut().zip(&column.pixel) {
-                *entry = u[i].mul_add(simd.splat(*pixel), *entry);
+                *entry = u.mul_add(simd.splat(*pixel), *entry);
             }
         }
     }
     let (constants, _) = block.arm_counts;
     for moved in block.arm.chunks_exact(6).skip(constants) {
-        for i in 0..6 {
-            u[i] = simd.load(&moved[i][at..]);
+        for (u, moved) in u.iter_mut().zip(moved) {
+            *u = simd.load(&moved[at..]);
         }
         add_outer(&u, &mut square);
     }
