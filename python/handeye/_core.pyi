@@ -419,6 +419,12 @@ class PoseMeasurements:
         sigmas_px: Sequence[ArrayLike | None] | None = None,
     ) -> None:
         """`sigmas_px`: deviations of the points of each view, which tell better points from worse."""
+    @staticmethod
+    def stated(motions: ArrayLike, poses: ArrayLike, covariances: ArrayLike) -> PoseMeasurements:
+        """Poses (K, 4, 4) that somebody else's detector states.
+
+        With the covariance (K, 6, 6) of their left perturbation, and the middle (K, 4, 4) of each chain.
+        """
 
     def __len__(self) -> int: ...
     @property

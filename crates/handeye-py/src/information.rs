@@ -1,5 +1,6 @@
 //! Entropy, gains and predicted information of candidates.
 
+use crate::call::CallCore;
 use handeye_core::error::Error;
 use handeye_core::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, Task, ToolPoint, Trace,
@@ -203,7 +204,7 @@ impl Predictor {
         let arm = noise.as_ref().zip(constants.as_ref()).map(|((noise, of_noise), (constants, count))| {
             ArmColumns { constants, noise, counts: (*count, *of_noise) }
         });
-        match py.detach(|| look(&self.model(), Motions::Matrices(matrices), arm)) {
+        match py.core(|| look(&self.model(), Motions::Matrices(matrices), arm))? {
             Ok(found) => Ok(found),
             Err(error @ Error::NotRigid { .. }) => {
                 // Once more, to say which.
