@@ -98,7 +98,7 @@ impl Problem {
         if let Some(k) = views.iter().find(|k| **k >= self.inner.view_count()) {
             return Err(invalid(py, &format!("view {k} of {}", self.inner.view_count())));
         }
-        Ok(py.core(|| {
+        py.core(|| {
             views
                 .iter()
                 .map(|k| {
@@ -107,7 +107,7 @@ impl Problem {
                         .map_or(f64::INFINITY, |b| b.squared_px)
                 })
                 .sum()
-        })?)
+        })
     }
 }
 

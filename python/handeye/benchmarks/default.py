@@ -27,7 +27,7 @@ def bench_default(options: Options, progress: Progress) -> dict[str, Any]:
         for name, arm in (("arm_described", kinematics), ("arm_not_described", None)):
             estimator = make_estimator(ModelName.AUTO, arm)
             methods[f"estimate_{views}_views_{name}"] = lambda e=estimator, m=measurements: e(m)
-    shipped = read_recording(shipped_recording())
+    shipped = read_recording(shipped_recording()).recording
     shipped = replace(shipped, views=shipped.views[: 8 if options.quick else None])
     methods[f"solve_shipped_{len(shipped.views)}_views"] = lambda: solve(shipped)
     progress(0, 1)

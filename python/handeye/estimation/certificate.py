@@ -190,9 +190,9 @@ def _sigmas(problem: PoseProblem, X: FloatArray, Y: FloatArray) -> tuple[float, 
     W = np.linalg.inv(Y)
     residual = problem.C @ W[list(targets)] - X[list(cameras)] @ problem.A
     # The difference of two rotation matrices has twice the square of the angle between them.
-    rotation = np.sqrt(np.mean(np.sum(residual[:, :3, :3] ** 2, axis=(1, 2))) / 6)
-    translation = np.sqrt(np.mean(np.sum(residual[:, :3, 3] ** 2, axis=1)) / 3)
-    return max(float(rotation), LEAST_SIGMA), max(float(translation), LEAST_SIGMA)
+    rotation = float(np.sqrt(9 * np.mean(np.square(residual[:, :3, :3])) / 6))
+    translation = float(np.sqrt(np.mean(np.square(residual[:, :3, 3]))))
+    return max(rotation, LEAST_SIGMA), max(translation, LEAST_SIGMA)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +233,7 @@ class _System:
             raise DegenerateError("these views do not determine the translations", code="degenerate")
         solve = -np.asarray(np.linalg.lstsq(free, fixed, rcond=None)[0])
         left = fixed + free @ solve
-        return cls(np.asarray(np.linalg.qr(left, mode="r"), np.float64), solve)
+        return cls(np.asarray(np.linalg.qr(left, mode="r"), np.float64), np.asarray(solve, np.float64))
 
 
 def _stacked(rotations: FloatArray) -> FloatArray:
@@ -278,7 +278,7 @@ def _descend(system: _System, rotations: FloatArray) -> FloatArray:
         H, g = J.T @ J, J.T @ residual
         scale = np.diag(np.maximum(np.diag(H), 1e-300))
         while True:
-            step = -np.linalg.lstsq(H + damping * scale, g, rcond=1e-15)[0]
+            step = -np.asarray(np.linalg.lstsq(H + damping * scale, g, rcond=1e-15)[0], np.float64)
             turned = _turned(rotations, step.reshape(-1, 3))
             residual_next = system.M @ np.append(_stacked(turned), 1.0)
             after = float(residual_next @ residual_next)
@@ -299,7 +299,7 @@ def _answer(
     both = np.tile(np.eye(4), (len(rotations), 1, 1))
     both[:, :3, :3] = rotations
     both[:, :3, 3] = (system.translations @ z).reshape(-1, 3)
-    return both[-cameras:], np.linalg.inv(both[:-cameras])
+    return both[-cameras:], np.asarray(np.linalg.inv(both[:-cameras]), np.float64)
 
 
 def _shortfall(M: FloatArray, z: FloatArray, cost: float) -> float:
@@ -316,13 +316,13 @@ def _shortfall(M: FloatArray, z: FloatArray, cost: float) -> float:
     residual, wide = M @ z, M @ across
     gradient = wide.T @ residual - cost * across[-1]
     at_z = across.T @ (constraints @ z).T
-    multipliers = np.linalg.lstsq(at_z, -gradient, rcond=None)[0]
-    F = wide.T @ wide - cost * np.outer(across[-1], across[-1])
-    F += across.T @ np.tensordot(multipliers, constraints, 1) @ across
+    multipliers = np.asarray(np.linalg.lstsq(at_z, -gradient, rcond=None)[0], np.float64)
+    inner = wide.T @ wide - cost * np.outer(across[-1], across[-1])
+    inner += across.T @ np.tensordot(multipliers, constraints, 1) @ across
     size = float(np.linalg.norm(multipliers))
     terms = np.linalg.norm(wide) * np.linalg.norm(residual) + np.linalg.norm(at_z) * size
     row = float(np.linalg.norm(gradient + at_z @ multipliers) + ROUNDING * terms) / length
-    values = np.linalg.eigvalsh(0.5 * (F + F.T))
+    values = np.linalg.eigvalsh(0.5 * (inner + inner.T))
     least = float(values[0] - ROUNDING * len(z) * (np.abs(values).max() + size))
     # Of [[0, row'], [row, F]] the smallest eigenvalue is above -row^2 / least, or above least - row.
     return row**2 / least if least > row else row - min(least, 0.0)
