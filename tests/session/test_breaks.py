@@ -15,6 +15,7 @@ from handeye.session.configuration import begin, go_on, prepare
 from handeye.session.deciding import EndReason
 from handeye.session.entry import Entry
 from handeye.session.faults import FaultRates
+from handeye.session.observer import Observer
 from handeye.session.store import create_session, open_session
 from sessions import Outcome, configured, run, run_killed
 
@@ -145,11 +146,12 @@ def test_an_interruption_stops_the_arm_and_leaves_the_session_whole(
     monkeypatch.setattr(Cell, "stop", lambda _: stopped.append(True))
     configuration = configured(2)
 
-    def interrupt(entry: Entry, estimate: object) -> None:
-        if entry.number == 4:
-            raise KeyboardInterrupt
+    class Interrupting(Observer):
+        def taken(self, entry: Entry, estimate: object) -> None:
+            if entry.number == 4:
+                raise KeyboardInterrupt
 
-    session, store = begin(prepare(configuration), tmp_path / "a", interrupt)
+    session, store = begin(prepare(configuration, observer=Interrupting()), tmp_path / "a")
     with pytest.raises(KeyboardInterrupt):
         session.run()
     store.close()

@@ -21,10 +21,13 @@ class Answer:
         Plain values with stable keys, units in the keys; printed as one JSON object with ``--json``.
     show
         Prints the same for a person.
+    after
+        Done once that is printed, such as keeping a page open; None for nothing.
     """
 
     data: Mapping[str, Any]
     show: "Callable[[Console], None]"
+    after: Callable[[], None] | None = None
 
 
 def json_text(data: Mapping[str, Any]) -> str:

@@ -35,7 +35,7 @@ def run(arguments: Sequence[str]) -> int:
         app = make_app(next(iter(arguments), ""))
         answer: Any = app(list(arguments), exit_on_error=False, print_error=False)
         if isinstance(answer, Answer):
-            _print(answer, as_json=as_json)
+            _give(answer, as_json=as_json)
         sys.stdout.flush()
         return ExitCode.SUCCESS
     except CycloptsError as error:
@@ -110,6 +110,13 @@ def _with_command(error: UnstatedError, arguments: Sequence[str]) -> HandeyeErro
 def _unexpected(error: BaseException) -> HandeyeError:
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     return UnexpectedError(f"unexpected {text}", hint=REPORT).with_traceback(error.__traceback__)
+
+
+def _give(answer: Answer, *, as_json: bool) -> None:
+    _print(answer, as_json=as_json)
+    sys.stdout.flush()
+    if answer.after is not None:
+        answer.after()
 
 
 def _print(answer: Answer, *, as_json: bool) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,14 +15,18 @@ from handeye.cli.arm import ArmSource
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
+from handeye.cli.page import Page, serve, show_views
 from handeye.cli.plan_together import Together, check_together, choose_together, show_together, together_data
 from handeye.cli.source import Source, mindful_of
 from handeye.datasets import read_poses
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Measurements, make_estimator
 from handeye.estimation.initialize import check_views
+from handeye.importing import Opened
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
 from handeye.planning.prediction import Sight
+from handeye.robots import ArmKinematics
+from handeye.session.deciding import Considered
 from handeye.types.calibration import MM_PER_M, ModelName
 
 if TYPE_CHECKING:
@@ -74,6 +79,7 @@ def plan(
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
+    page: Page = Page(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Rank the views to take next, each with the accuracy predicted after it.
@@ -170,7 +176,39 @@ def plan(
     data = _data(found)
     if output is not None:
         write_json(output, data)
-    return Answer(data, lambda console: _show(console, found, top or SHOWN))
+    after = None if not page.ui else partial(_page, page, opened, start, found, pool, kinematics, arm.robot)
+    return Answer(data, lambda console: _show(console, found, top or SHOWN), after)
+
+
+def _page(
+    page: Page,
+    opened: Opened,
+    taken: Measurements,
+    found: _Plan,
+    pool: Pool,
+    kinematics: ArmKinematics | None,
+    description: str | None,
+) -> None:
+    ranking, estimate = found.ranking, found.estimate
+    out = [c for c in pool.candidates if c.name in ranking.infeasible and c.name not in found.used]
+    considered = Considered(
+        Pool(tuple(prospect.candidate for prospect in ranking.prospects)),
+        np.array([prospect.gain for prospect in ranking.prospects]),
+        np.array([candidate.T_base_flange.matrix for candidate in out]).reshape(-1, 4, 4),
+        tuple(ranking.infeasible[candidate.name] for candidate in out),
+    )
+    best = ranking.prospects[0].candidate.name if ranking.prospects else None
+    shown = show_views(
+        page,
+        opened,
+        taken,
+        estimate,
+        arm=None if kinematics is None else kinematics.arm,
+        description=description,
+        considered=considered,
+        chosen=best,
+    )
+    serve(shown)
 
 
 def _names(pool: Pool) -> set[str]:

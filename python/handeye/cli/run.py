@@ -13,6 +13,7 @@ from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder
+from handeye.cli.page import Live, Page
 from handeye.cli.run_options import Limits, Simulated, Timeouts
 from handeye.cli.session_report import report_of_session
 from handeye.datasets import read_camera, read_target
@@ -30,6 +31,7 @@ from handeye.session.drivers import REPLAY, Person
 from handeye.session.entry import Entry
 from handeye.session.journal import read_settings
 from handeye.session.loop import End, Session
+from handeye.session.observer import Observer
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore
@@ -65,6 +67,7 @@ def run(
     limits: Limits = Limits(),  # noqa: B008 - frozen, like those below
     timeouts: Timeouts = Timeouts(),  # noqa: B008
     simulated: Simulated = Simulated(),  # noqa: B008
+    page: Page = Page(),  # noqa: B008
     common: Common = Common(),  # noqa: B008
 ) -> Answer:
     """Drive the arm from view to view until the accuracy asked for is reached.
@@ -114,11 +117,10 @@ def run(
     confirm
         Ask before every motion; the default on a real arm.
     """
-    person = _person()
     if resume:
         if session is None:
             raise UsageError("--resume needs --session", hint="give the folder of the session to go on with")
-        return _resumed(session, person, confirm, as_json=common.json)
+        return _resumed(session, confirm, page, as_json=common.json)
     replays = driver.partition(":")[0] == REPLAY
     if replays and (camera, target, mounting) != (None, None, None):
         raise UsageError(
@@ -158,26 +160,46 @@ def run(
     )
     if (driver == SIMULATED) != (images == SIMULATED):
         raise UsageError("--driver and --images are either both simulated or both not")
+    if not dry_run:
+        if session is None:
+            hint = "name a folder to write, or look first with --dry-run"
+            raise UsageError("--session is missing", hint=hint)
+        check_new_folder(session)
+    front = _Front(page if not dry_run else Page(), configuration, confirm, as_json=common.json)
     prepared = prepare(
         configuration,
         camera=None if camera is None else read_camera(camera),
         target=None if target is None else read_target(target),
-        person=person,
-        confirm=_confirm(confirm, configuration, person),
+        person=front.person,
+        confirm=front.confirm,
+        observer=front.observer,
     )
-    if dry_run:
-        return _plan(prepared)
     if session is None:
-        raise UsageError("--session is missing", hint="name a folder to write, or look first with --dry-run")
-    check_new_folder(session)
-    loop, store = begin(prepared, session, None if common.json else _Progress())
-    return _answer(session, configuration, prepared, _driven(loop, store, prepared))
+        return _plan(prepared)
+    loop, store = begin(prepared, session)
+    return _answer(session, configuration, prepared, _driven(loop, store, prepared, front))
 
 
-def _driven(loop: Session, store: SessionStore, prepared: Prepared) -> End:
+class _Front:
+    """Who looks on and whom to ask: a page in the browser, or the terminal."""
+
+    def __init__(
+        self, page: Page, configuration: Configuration, confirm: bool | None, *, as_json: bool
+    ) -> None:
+        self.live = Live(page, configuration.driver, configuration.images) if page.ui else None
+        if self.live is not None:
+            self.person, self.confirm = self.live.person, self.live.confirm
+            self.observer: Observer = self.live.observer
+        else:
+            self.person = _person()
+            self.confirm = _confirm(confirm, configuration, self.person)
+            self.observer = Observer() if as_json else _Progress()
+
+
+def _driven(loop: Session, store: SessionStore, prepared: Prepared, front: _Front) -> End:
     """Run a session to its end, tell it what was true, and let others open it."""
     try:
-        end = loop.run()
+        end = loop.run() if front.live is None else front.live.run(loop, store, prepared)
         if prepared.truth is not None:
             store.reveal(prepared.truth)
     finally:
@@ -185,15 +207,13 @@ def _driven(loop: Session, store: SessionStore, prepared: Prepared) -> End:
     return end
 
 
-def _resumed(session: Path, person: Person, confirm: bool | None, *, as_json: bool) -> Answer:
+def _resumed(session: Path, confirm: bool | None, page: Page, *, as_json: bool) -> Answer:
     configuration = Configuration.from_dict(read_settings(session).asked.get("configuration"))
+    front = _Front(page, configuration, confirm, as_json=as_json)
     loop, store, prepared = go_on(
-        session,
-        None if as_json else _Progress(),
-        person=person,
-        confirm=_confirm(confirm, configuration, person),
+        session, person=front.person, confirm=front.confirm, observer=front.observer
     )
-    return _answer(session, configuration, prepared, _driven(loop, store, prepared))
+    return _answer(session, configuration, prepared, _driven(loop, store, prepared, front))
 
 
 def _described(robot: str) -> str:
@@ -243,10 +263,11 @@ def _confirm(wanted: bool | None, configuration: Configuration, person: Person) 
     return confirm
 
 
-class _Progress:
+class _Progress(Observer):
     """Says on stderr what each attempt brought."""
 
-    def __call__(self, entry: Entry, estimate: Estimate | None) -> None:
+    def taken(self, entry: Entry, estimate: Estimate | None) -> None:
+        """Say it."""
         known = ""
         if estimate is not None:
             now = estimate.within_95

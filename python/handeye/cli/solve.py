@@ -1,5 +1,6 @@
 """`handeye solve`: the answer for a folder of views."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,13 +10,17 @@ from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
+from handeye.cli.page import Page, serve, show_views
 from handeye.cli.solve_poses import answer_for_poses
 from handeye.cli.source import Source, mindful_of
 from handeye.datasets import PosePairs
+from handeye.estimation import Measurements, make_estimator
 from handeye.estimation import solve as solve_recording
 from handeye.estimation.certificate import Certificate, certify_calibration
 from handeye.estimation.confidence import Ellipsoid, position_region, within
+from handeye.estimation.mistakes import examine
 from handeye.importing import Opened
+from handeye.robots import ArmKinematics
 from handeye.types.calibration import Calibration, JointOffset, ModelName, RobotSide
 
 if TYPE_CHECKING:
@@ -33,6 +38,7 @@ def solve(
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
+    page: Page = Page(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Calibrate from a folder of views.
@@ -73,7 +79,19 @@ def solve(
         data["certificate"] = certificate.to_dict()
     if output is not None:
         write_json(output, data)
-    return Answer(data, lambda console: _show(console, opened, calibration, region, certificate, output))
+    after = None if not page.ui else partial(_page, page, opened, model, kinematics, arm.robot)
+    return Answer(
+        data, lambda console: _show(console, opened, calibration, region, certificate, output), after
+    )
+
+
+def _page(
+    page: Page, opened: Opened, model: ModelName, kinematics: ArmKinematics | None, description: str | None
+) -> None:
+    measurements = examine(Measurements.of_recording(opened.recording)).measurements
+    estimate = make_estimator(model, kinematics)(measurements)
+    known = None if kinematics is None else kinematics.arm
+    serve(show_views(page, opened, measurements, estimate, arm=known, description=description))
 
 
 def _data(opened: Opened, calibration: Calibration, region: Ellipsoid) -> dict[str, Any]:

@@ -82,12 +82,18 @@ def radius(covariance: FloatArray, degrees_of_freedom: float, probability: float
 
 
 def position_region(calibration: Calibration, probability: float = PROBABILITY) -> Ellipsoid:
-    """Return the ellipsoid that holds the true position of the camera with a probability.
+    """Return the ellipsoid that holds the true position of the camera with a probability."""
+    return ellipsoid(calibration.covariance[:3, :3], calibration.degrees_of_freedom, probability)
 
-    ``rho' C^-1 rho <= 3 F(3, nu)`` over the translation part C of the covariance, nu the degrees of freedom
-    of the noise levels behind it.
+
+def ellipsoid(
+    covariance: FloatArray, degrees_of_freedom: float, probability: float = PROBABILITY
+) -> Ellipsoid:
+    """Return the ellipsoid that holds a position of this covariance C (3, 3), metres, with a probability.
+
+    ``rho' C^-1 rho <= 3 F(3, nu)``, nu the degrees of freedom of the noise levels behind it.
     """
-    variances, vectors = np.linalg.eigh(calibration.covariance[:3, :3])
-    scale = 3 * f_quantile(probability, 3, calibration.degrees_of_freedom)
+    variances, vectors = np.linalg.eigh(covariance)
+    scale = 3 * f_quantile(probability, 3, degrees_of_freedom)
     lengths = np.sqrt(np.clip(variances, 0, None) * scale)
     return Ellipsoid(probability, lengths[::-1].copy(), vectors.T[::-1].copy())

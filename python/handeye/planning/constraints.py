@@ -1,6 +1,5 @@
 """What makes a posture usable as a view: distance, tilt, sight, and room for the arm there and on the way."""
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -89,14 +88,16 @@ class ViewConstraints:
         """The arm."""
         return self.body.arm
 
-    def passing(self, joints: FloatArray) -> tuple[IndexArray, Counter[str]]:
+    def passing(self, joints: FloatArray) -> tuple[IndexArray, dict[int, str]]:
         """Return which of postures (N, n) pass, in their order, and for which first reason others do not."""
         left = np.arange(len(joints))
-        turned_down: Counter[str] = Counter()
+        turned_down: dict[int, str] = {}
         # Each is asked only of what the ones before it let through; the costly ones come last.
         for reasons in (self._bad_views, self._hidden, self.body.obstacles, self._failed_before):
             why = reasons(joints[left])
-            turned_down.update(reason for reason in why if reason is not None)
+            turned_down |= {
+                int(index): reason for index, reason in zip(left, why, strict=True) if reason is not None
+            }
             left = left[[reason is None for reason in why]]
         return left, turned_down
 

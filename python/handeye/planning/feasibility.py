@@ -1,5 +1,6 @@
 """Robot poses that could be taken next: around the target and around the arm's own postures, then sifted."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -18,12 +19,17 @@ from handeye.types.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class FeasiblePool:
-    """Candidates with the joints that reach them, how many were turned down for which reason, and by what."""
+    """Candidates with the joints that reach them, how many were turned down for which reason, and by what.
+
+    `ruled_out` has the postures (M, n) that were turned down, `reasons` why, in the same order.
+    """
 
     pool: Pool
     joints: Mapping[str, FloatArray]
     turned_down: Mapping[str, int]
     constraints: ViewConstraints
+    ruled_out: FloatArray
+    reasons: tuple[str, ...]
 
     @property
     def sight(self) -> Sight:
@@ -99,14 +105,22 @@ class Generator:
             taken,
             np.array(shunned, dtype=np.float64),
         )
-        passed, turned_down = constraints.passing(joints)
-        joints = joints[passed]
+        passed, reason_of = constraints.passing(joints)
+        ruled_out, joints = joints[list(reason_of)], joints[passed]
+        turned_down = Counter(reason_of.values())
         turned_down["the arm does not reach the pose"] = unreached
         width = len(str(len(joints)))
         names = [f"{prefix}_{i:0{width}d}" for i in range(1, len(joints) + 1)]
         found = {name: count for name, count in turned_down.items() if count > 0}
         pool = candidates_at(self.arm, names, joints)
-        return FeasiblePool(pool, dict(zip(names, joints, strict=True)), found, constraints)
+        return FeasiblePool(
+            pool,
+            dict(zip(names, joints, strict=True)),
+            found,
+            constraints,
+            ruled_out,
+            tuple(reason_of.values()),
+        )
 
     def _on_shell(self, estimate: Estimate, taken: FloatArray, random: np.random.Generator) -> FloatArray:
         """Joints (M, n) of camera poses that look at the target from all around, rolled."""

@@ -5,6 +5,7 @@ from handeye.session.choosing import ArmChooser
 from handeye.session.deciding import Chooser, EndReason, Halt, Situation, Step
 from handeye.session.entry import Entry, Failure
 from handeye.session.loop import End, Session
+from handeye.session.observer import Observer
 from handeye.session.request import Requested
 from handeye.session.simulated import SimulatedCell, SimulationOptions, simulated_cell
 from handeye.session.starting import Start
@@ -20,6 +21,7 @@ __all__ = [
     "Entry",
     "Failure",
     "Halt",
+    "Observer",
     "Patience",
     "Requested",
     "Session",

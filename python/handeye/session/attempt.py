@@ -22,6 +22,7 @@ from handeye.robots.reading import BAD_READING, checked_reading, typed_reading
 from handeye.robots.replay import is_near
 from handeye.session.calls import Calls
 from handeye.session.entry import Failure
+from handeye.session.observer import Observer
 from handeye.session.safety import body_of, objection_to_motion
 from handeye.types import Camera, Pose, Target
 
@@ -101,6 +102,8 @@ class Cell:
         No goal is sent that is faster.
     by_hand
         Whether a person moves the arm, who sees the way and may not know the joints.
+    observer
+        Told of what happens.
     """
 
     robot: Robot
@@ -114,6 +117,7 @@ class Cell:
     solids: SolidLinks | None = None
     speed_rad_s: float = math.inf
     by_hand: bool = False
+    observer: Observer = field(default_factory=Observer)
     robot_calls: Calls = field(default_factory=lambda: Calls("robot"))
     camera_calls: Calls = field(default_factory=lambda: Calls("camera"))
 
@@ -135,8 +139,11 @@ class Cell:
         """
         answer = self.robot_calls.run(self.patience.read_s, self.robot.read_pose)
         if self.arm is None or self.workspace is None:
-            return typed_reading(answer)
-        return checked_reading(answer, self.arm, joints_needed=not self.by_hand, expected=expected)
+            reading = typed_reading(answer)
+        else:
+            reading = checked_reading(answer, self.arm, joints_needed=not self.by_hand, expected=expected)
+        self.observer.stands(reading)
+        return reading
 
     def objection(self, goal: Goal, standing: Reading, estimate: Estimate | None) -> str | None:
         """Say why a goal must not be sent from where the arm stands, None if it may be."""
@@ -200,6 +207,7 @@ def attempt(
     started = time.monotonic()
     predicted = None if foresee is None else foresee(reading.T_base_flange)
     found = _look(cell, frame, digests, predicted)
+    cell.observer.looked(goal.label, frame.image, None if isinstance(found, Missed) else found[0])
     timings["detect"] = time.monotonic() - started
     if isinstance(found, Missed):
         return replace(found, standing=reading)
@@ -224,6 +232,7 @@ def _go(cell: Cell, goal: Goal, estimate: Estimate | None) -> Reading | Missed:
         return Missed(Failure.MOTION_REFUSED, why, moved=False, standing=before)
     if cell.confirm is not None and not cell.confirm(goal):
         return Missed(Failure.NOT_CONFIRMED, "not confirmed", moved=False, standing=before)
+    cell.observer.goes(goal)
     try:
         cell.robot_calls.run(cell.patience.move_s, cell.robot.move_to, goal)
     except DeviceError as error:

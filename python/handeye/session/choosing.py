@@ -17,7 +17,16 @@ from handeye.planning.solids import SolidLinks
 from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
-from handeye.session.deciding import EndReason, Halt, Situation, Step, decision_of, estimator_of, halt_of
+from handeye.session.deciding import (
+    Considered,
+    EndReason,
+    Halt,
+    Situation,
+    Step,
+    decision_of,
+    estimator_of,
+    halt_of,
+)
 from handeye.session.entry import TRANSIENT, Entry, Failure
 from handeye.session.starting import Start, starting_goal
 from handeye.session.wish import Wish
@@ -180,7 +189,12 @@ class ArmChooser:
                     more["refined"] = climbed[name]
                 pose = answer.candidate.T_base_flange
                 goal = self._goal(situation, pose, tuple(joints_of[name].tolist()))
-                return Step(goal, "plan", decision_of(answer, estimate, more), estimate)
+                considered = Considered(
+                    planner.pool, planner.gains(), self._arm.forward(drawn.ruled_out), drawn.reasons
+                )
+                return Step(
+                    goal, "plan", decision_of(answer, estimate, more), estimate, considered=considered
+                )
             turned_down[f"on the way: {why}"] = turned_down.get(f"on the way: {why}", 0) + 1
             planner.give_up(name)
             answer = planner.ask()

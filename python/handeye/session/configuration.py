@@ -20,8 +20,9 @@ from handeye.session.attempt import Cell
 from handeye.session.choosing import ArmChooser
 from handeye.session.deciding import Chooser
 from handeye.session.drivers import REPLAY, Person, open_camera, open_robot, replayed_camera
-from handeye.session.entry import Entry
-from handeye.session.loop import Progress, Session
+from handeye.session.entry import Entry, views_of
+from handeye.session.loop import Session
+from handeye.session.observer import Observer
 from handeye.session.recorded import RecordedChooser
 from handeye.session.safety import body_of
 from handeye.session.settings import Collisions, Configuration, check_fingerprints, fingerprints, read_start
@@ -90,6 +91,10 @@ class Prepared:
         limits = self.configuration.limits
         return ArmChooser(self.arm, cell.workspace, cell.camera, self.start, wish, limits, cell.solids)
 
+    def session(self, store: SessionStore) -> Session:
+        """Return the session that writes into a store."""
+        return Session(self.cell, store, self.chooser(), self.configuration.wish())
+
 
 def prepare(
     configuration: Configuration,
@@ -99,6 +104,7 @@ def prepare(
     person: Person | None = None,
     confirm: Callable[[Goal], bool] | None = None,
     start: Start | None = None,
+    observer: Observer | None = None,
 ) -> Prepared:
     """Open the drivers and see where the arm stands; nothing moves.
 
@@ -110,6 +116,8 @@ def prepare(
         Asked by the drivers that need a person.
     start
         Where the arm stood when the session began, on going on; None to ask the robot.
+    observer
+        Told of what happens.
 
     Raises
     ------
@@ -119,8 +127,9 @@ def prepare(
         A driver fails.
     """
     configuration.wish()  # refused now rather than once the arm has moved
+    observer = observer or Observer()
     if configuration.is_replay:
-        return _replayed(configuration, camera, confirm)
+        return _replayed(configuration, camera, confirm, observer)
     if configuration.robot is None:
         raise InputError(
             "no arm is named",
@@ -133,7 +142,7 @@ def prepare(
         configuration, collisions=Collisions.CAPSULES if solids is None else Collisions.MESHES
     )
     if configuration.is_simulated:
-        return _simulated(configuration, arm, target, confirm, solids)
+        return _simulated(configuration, arm, target, confirm, solids, observer)
     if camera is None or target is None:
         raise InputError("a real cell needs camera and target", code="missing_value")
     workspace = configuration.workspace()
@@ -152,6 +161,7 @@ def prepare(
         solids,
         configuration.speed_rad_s,
         by_hand=configuration.by_hand,
+        observer=observer,
     )
     if start is None:
         start = _standing(cell, arm)
@@ -159,7 +169,7 @@ def prepare(
     return Prepared(configuration, cell, start, recording)
 
 
-def begin(prepared: Prepared, folder: Any, progress: Progress | None = None) -> tuple[Session, SessionStore]:  # noqa: ANN401
+def begin(prepared: Prepared, folder: Any) -> tuple[Session, SessionStore]:  # noqa: ANN401
     """Make the folder of a session and the session.
 
     Raises
@@ -177,17 +187,17 @@ def begin(prepared: Prepared, folder: Any, progress: Progress | None = None) -> 
             "posture_known": prepared.start.posture_known,
         }
     settings |= fingerprints(prepared.cell.arm, prepared.recorded)
-    chooser = prepared.chooser()
+    prepared.chooser()  # refused before anything is written
     store = create_session(folder, prepared.recording, settings)
-    return Session(prepared.cell, store, chooser, prepared.configuration.wish(), progress), store
+    return prepared.session(store), store
 
 
 def go_on(
     folder: Any,  # noqa: ANN401 - a path
-    progress: Progress | None = None,
     *,
     person: Person | None = None,
     confirm: Callable[[Goal], bool] | None = None,
+    observer: Observer | None = None,
 ) -> tuple[Session, SessionStore, Prepared]:
     """Open a session that was broken off, or has ended, with the same settings.
 
@@ -201,7 +211,7 @@ def go_on(
     store = open_session(folder)
     try:
         configuration = Configuration.from_dict(store.settings.get("configuration"))
-        begun = any(entry.view is not None for entry in store.entries) or configuration.is_simulated
+        begun = bool(views_of(store.entries)) or configuration.is_simulated
         # Before the first view the arm may be driven elsewhere, and begins from there.
         start = read_start(store.settings) if begun and not configuration.is_replay else None
         recording = store.recording
@@ -212,11 +222,12 @@ def go_on(
             person=person,
             confirm=confirm,
             start=start,
+            observer=observer,
         )
         check_fingerprints(store.settings, fingerprints(prepared.cell.arm, prepared.recorded))
         if prepared.hidden_arm is not None and start is not None:
             prepared.hidden_arm.place(_left_at(store.entries) or start.joints_rad)
-        session = Session(prepared.cell, store, prepared.chooser(), configuration.wish(), progress)
+        session = prepared.session(store)
     except BaseException:
         store.close()
         raise
@@ -288,6 +299,7 @@ def _replayed(
     configuration: Configuration,
     camera: Camera | None,
     confirm: Callable[[Goal], bool] | None,
+    observer: Observer,
 ) -> Prepared:
     if configuration.images.partition(":")[0] != REPLAY:
         raise InputError("a replayed robot needs the replayed camera", code="unknown_driver")
@@ -305,6 +317,7 @@ def _replayed(
         source.target,
         configuration.patience,
         confirm,
+        observer=observer,
     )
     recording = Recording(
         f"replay of {source.name}", source.mounting, source.camera, source.target, (), None, source.source
@@ -342,6 +355,7 @@ def _simulated(
     target: Target | None,
     confirm: Callable[[Goal], bool] | None,
     solids: SolidLinks | None,
+    observer: Observer,
 ) -> Prepared:
     wrong = configuration.simulation
     look = Appearance(blur_px=wrong.blur_px, noise=wrong.pixel_noise)
@@ -367,6 +381,7 @@ def _simulated(
         confirm=confirm,
         solids=solids,
         speed_rad_s=configuration.speed_rad_s,
+        observer=observer,
     )
     start = _safe(made.start, cell)
     return Prepared(configuration, cell, start, made.recording, made.truth, made.hidden_arm)

@@ -1,7 +1,7 @@
 """What a decision of the loop may look at, and what it can be: a step, or a halt."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from typing import Any, Protocol
@@ -9,10 +9,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from handeye.estimation import Estimate, Estimator, Measurements
-from handeye.planning import Proposal, Stop, StopReason
+from handeye.planning import Pool, Proposal, Stop, StopReason
 from handeye.robots.protocol import Goal
 from handeye.session.entry import Entry
 from handeye.types import View
+from handeye.types.arrays import FloatArray
 from handeye.types.kinematics import Kinematics
 
 # Views before anything is planned.
@@ -28,6 +29,7 @@ class EndReason(StrEnum):
     NO_START = "no_start"
     TOO_MANY_FAILURES = "too_many_failures"
     ROBOT_HANGS = "robot_hangs"
+    BY_HAND = "by_hand"
 
 
 # Ends without an answer.
@@ -43,7 +45,7 @@ class Situation:
     entries
         All attempts so far.
     views
-        What they brought.
+        What they brought, without what was withdrawn.
     measurements
         Those of them to plan from: views that turned out wrong are left out.
     estimate
@@ -88,14 +90,33 @@ class Situation:
 
 
 @dataclass(frozen=True, eq=False)
+class Considered:
+    """What a decision chose from, for those who look on.
+
+    Parameters
+    ----------
+    pool, gains
+        Candidates, and the gain (N,) of each; NaN where too little of the target would be in sight.
+    ruled_out, reasons
+        (M, 4, 4) poses of the flange that were turned down, and why.
+    """
+
+    pool: Pool
+    gains: FloatArray
+    ruled_out: FloatArray = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
-    """What to do next, how it was decided, and how many seconds that took."""
+    """What to do next, how it was decided, from what, and how many seconds that took."""
 
     goal: Goal
     phase: str
     decision: dict[str, Any]
     estimate: Estimate | None
     seconds: float = 0.0
+    considered: Considered | None = None
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """One attempt at a view, as the journal keeps it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -25,6 +25,8 @@ class Failure(StrEnum):
     POOR_IMAGE = "poor_image"
     NOT_FOUND = "not_found"
     INCONSISTENT = "inconsistent"
+    WITHDRAWN = "withdrawn"
+    """A person took a view back."""
 
 
 # Worth another try at the same place: nothing says that the place is to blame.
@@ -57,6 +59,7 @@ class _EntryDocument(Document):
     timings_s: dict[str, float] = {}  # noqa: RUF012
     image_digest: str | None = None
     standing_rad: list[float] | None = None
+    withdraws: str | None = None
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,8 @@ class Entry:
         Of the image, to notice one that comes twice.
     standing_rad
         Joints where the robot said that it stood afterwards; None if it did not say.
+    withdraws
+        Name of a view that does not count any more; nothing was attempted then.
     """
 
     number: int
@@ -102,6 +107,7 @@ class Entry:
     timings_s: Mapping[str, float] = field(default_factory=dict[str, float])
     image_digest: str | None = None
     standing_rad: tuple[float, ...] | None = None
+    withdraws: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; `from_dict` reads them back."""
@@ -119,6 +125,7 @@ class Entry:
             timings_s=dict(self.timings_s),
             image_digest=self.image_digest,
             standing_rad=None if self.standing_rad is None else list(self.standing_rad),
+            withdraws=self.withdraws,
         )
 
     @classmethod
@@ -145,4 +152,11 @@ class Entry:
             document.timings_s,
             document.image_digest,
             None if document.standing_rad is None else tuple(document.standing_rad),
+            document.withdraws,
         )
+
+
+def views_of(entries: Sequence[Entry]) -> list[View]:
+    """Return the views that attempts brought, without those that were withdrawn."""
+    withdrawn = {entry.withdraws for entry in entries}
+    return [entry.view for entry in entries if entry.view is not None and entry.view.name not in withdrawn]

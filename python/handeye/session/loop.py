@@ -4,7 +4,6 @@ What happens next is a function of the journal and the seed alone: after a break
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from handeye.errors import InputError
@@ -14,7 +13,7 @@ from handeye.estimation.mistakes import examine
 from handeye.session.attempt import Cell
 from handeye.session.contract import check_at_rest
 from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step
-from handeye.session.entry import Entry
+from handeye.session.entry import Entry, Failure, views_of
 from handeye.session.store import SessionStore
 from handeye.session.taking import Taker
 from handeye.session.wish import Wish
@@ -35,9 +34,7 @@ class End:
     reach: Within | None
     views: int
     attempts: int
-
-
-Progress = Callable[[Entry, Estimate | None], None]
+    estimate: Estimate | None = None
 
 
 class Session:
@@ -53,8 +50,6 @@ class Session:
         Decides where to go.
     wish
         What is asked for.
-    progress
-        Told of every attempt.
     """
 
     def __init__(
@@ -63,18 +58,16 @@ class Session:
         store: SessionStore,
         chooser: Chooser,
         wish: Wish,
-        progress: Progress | None = None,
     ) -> None:
         self._cell = cell
         self._store = store
         self._chooser = chooser
         self._wish = wish
-        self._progress = progress
         self._taker = Taker(cell, store)
         known = wish.joints_err and wish.model is ModelName.AUTO
         self._kinematics = chooser.kinematics if known else None
         self._estimator: Estimator = make_estimator(wish.model, self._kinematics)
-        self._measurements = Measurements.of(store.recording.mounting, cell.camera, cell.target)
+        self._measurements = self._no_measurements()
         self._forgiven_up_to: int | None = None
 
     def run(self) -> End:
@@ -112,7 +105,8 @@ class Session:
         if len(measurements) < len(views) and len(views) >= self._wish.most_views:
             return self._end(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
         estimate = self._estimator(measurements) if len(measurements) >= START_VIEWS else None
-        answer = self._choose(Situation(self._store.entries, tuple(views), measurements, estimate))
+        attempts = tuple(entry for entry in self._store.entries if entry.withdraws is None)
+        answer = self._choose(Situation(attempts, tuple(views), measurements, estimate))
         if isinstance(answer, Step):
             return replace(answer, seconds=time.monotonic() - began)
         return self._end(answer.reason, answer.sentence)
@@ -125,14 +119,24 @@ class Session:
                 first = self._chooser.choose(situation)
                 if not isinstance(first, Halt) or first.reason not in FAILED:
                     return first
-                self._forgiven_up_to = len(situation.entries)
+                self._forgiven_up_to = situation.entries[-1].number
         forgiven = sum(1 for entry in situation.missed if entry.number <= self._forgiven_up_to)
         return self._chooser.choose(replace(situation, forgiven=forgiven))
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """The views that count, in the order in which they were taken."""
+        return tuple(self._usable())
+
+    @property
+    def rejected(self) -> dict[str, str]:
+        """Views whose points are no picture of the target, and why."""
+        return dict(self._measurements.rejected)
 
     def _usable(self) -> list[View]:
         """Return the views with joints that the arm can have; older sessions may hold others."""
         arm = self._cell.arm
-        views = [entry.view for entry in self._store.entries if entry.view is not None]
+        views = views_of(self._store.entries)
         if arm is None:
             return views
         needed = self._kinematics is not None
@@ -151,23 +155,59 @@ class Session:
             The disk does not take it.
         """
         entry = self._taker.take(step)
-        if self._progress is not None:
-            self._progress(entry, step.estimate)
+        self._cell.observer.taken(entry, step.estimate)
         return entry
+
+    def withdraw(self, name: str, why: str) -> Entry:
+        """Take a view back: it stays in the journal, and counts no more.
+
+        Raises
+        ------
+        InputError
+            There is no such view.
+        OutputError
+            The disk does not take it.
+        """
+        view = next((view for view in self.views if view.name == name), None)
+        if view is None:
+            raise InputError(f"view {name[:60]}: no view of this session", code="unknown_view")
+        entry = Entry(
+            len(self._store.entries) + 1,
+            name,
+            "withdraw",
+            view.T_base_flange,
+            (),
+            moved=False,
+            failure=Failure.WITHDRAWN,
+            detail=why,
+            withdraws=name,
+        )
+        self._store.append(entry)
+        self._cell.observer.taken(entry, None)
+        return entry
+
+    def _no_measurements(self) -> Measurements:
+        return Measurements.of(self._store.recording.mounting, self._cell.camera, self._cell.target)
 
     def _with(self, views: list[View]) -> Measurements:
         """Return the measurements of these views; those measured before are not measured again."""
         known = {view.name for view in self._measurements.views} | set(self._measurements.rejected)
+        if known - {view.name for view in views}:  # withdrawn
+            self._measurements, known = self._no_measurements(), set[str]()
         self._measurements = self._measurements.with_views(view for view in views if view.name not in known)
         return self._measurements
+
+    def end(self) -> End:
+        """End here, because somebody says so, with the answer from the views so far."""
+        return self._end(EndReason.BY_HAND, f"ended by hand after {len(self.views)} views")
 
     def _end(self, reason: EndReason, sentence: str) -> End:
         entries = self._store.entries
         views = self._usable()
-        left_out = [e.view.name for e in entries if e.view is not None and e.view not in views]
+        left_out = [view.name for view in views_of(entries) if view not in views]
         if left_out:
             sentence += f"; without {', '.join(left_out)}, whose joint positions are not those of the arm"
-        calibration, radii = None, None
+        calibration, radii, estimate = None, None, None
         measurements = self._with(views)
         if len(measurements) >= START_VIEWS:
             try:
@@ -181,7 +221,7 @@ class Session:
             if estimate.determined:
                 calibration = calibrate_examined(examination, self._wish.model, kinematics=self._kinematics)
                 radii = estimate.within_95
-        return End(reason, sentence, calibration, radii, len(views), len(entries))
+        return End(reason, sentence, calibration, radii, len(views), len(entries), estimate)
 
 
 def _without_mistakes(measurements: Measurements) -> Measurements:

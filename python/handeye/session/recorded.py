@@ -11,6 +11,7 @@ from handeye.planning.travel import Travel
 from handeye.robots import Arm, ArmKinematics, arm_kinematics
 from handeye.robots.protocol import Goal
 from handeye.session.deciding import (
+    Considered,
     EndReason,
     Halt,
     Situation,
@@ -86,7 +87,10 @@ class RecordedChooser:
                 return halt
             return Halt(halt.reason, f"none of the {len(self._views)} recorded views is left")
         view = next(view for view in left if view.name == answer.candidate.name)
-        return Step(self._goal(view), "plan", decision_of(answer, estimate, {}), estimate)
+        considered = Considered(planner.pool, planner.gains())
+        return Step(
+            self._goal(view), "plan", decision_of(answer, estimate, {}), estimate, considered=considered
+        )
 
     def _goal(self, view: View) -> Goal:
         return Goal(f"{view.name}.1", view.T_base_flange, view.joints_rad, self._wish.speed_rad_s)

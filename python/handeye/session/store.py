@@ -23,7 +23,7 @@ from handeye.datasets.reading import existing_folder, is_file, reason
 from handeye.datasets.recording_format import ViewsApart, read_views_apart, write_empty_recording
 from handeye.datasets.writing import new_folder, remove_partials, replace_file, write_file
 from handeye.errors import InputError, OutputError
-from handeye.session.entry import Entry
+from handeye.session.entry import Entry, views_of
 from handeye.session.journal import (
     JOURNAL_FILE,
     SETTINGS_FILE,
@@ -93,7 +93,7 @@ class SessionStore:
             recording lags behind, to be brought up to date with the next view or the next opening.
         """
         self._journal.append(entry)
-        if entry.view is not None:
+        if entry.view is not None or entry.withdraws is not None:
             self.bring_up_to_date()
 
     def reveal(self, truth: Truth) -> None:
@@ -119,7 +119,7 @@ class SessionStore:
         OutputError
             The system refuses to write.
         """
-        self._recording = self._recording.with_views(_views(self._journal))
+        self._recording = self._recording.with_views(views_of(self.entries))
         write_recording(self._recording, self.folder, replace=True)
 
 
@@ -174,10 +174,6 @@ def is_session(folder: Path) -> bool:
     return is_file(folder / SETTINGS_FILE) and is_file(folder / JOURNAL_FILE)
 
 
-def _views(journal: Journal) -> list[View]:
-    return [entry.view for entry in journal.entries if entry.view is not None]
-
-
 def _recording_of(root: Path, settings: Settings, journal: Journal) -> tuple[Recording, bool]:
     """Return the recording that follows from the journal, and whether it is what lies on the disk.
 
@@ -186,7 +182,8 @@ def _recording_of(root: Path, settings: Settings, journal: Journal) -> tuple[Rec
     InputError
         The recording holds what the journal lacks, or was edited.
     """
-    views = _views(journal)
+    views = views_of(journal.entries)
+    taken = [entry.view for entry in journal.entries if entry.view is not None]
     base = None if settings.recording is None else Recording.from_dict(settings.recording)
     path = root / RECORDING_FILE
     if base is not None and not path.exists() and not path.is_symlink():
@@ -195,7 +192,7 @@ def _recording_of(root: Path, settings: Settings, journal: Journal) -> tuple[Rec
     found = read_views_apart(root)
     if base is None:
         base = found.recording
-    _check_same(path, base, found, views)
+    _check_same(path, base, found, taken)
     recording = base.with_views(views)
     current = list(found.views) == [view.name for view in views] and not any(
         isinstance(view, InputError) for view in found.views.values()

@@ -16,6 +16,7 @@ from handeye.estimation.confidence import Within
 from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import START_VIEWS
 from handeye.session.entry import Entry
+from handeye.session.observer import Observer
 from handeye.session.settings import Configuration, Simulation
 from handeye.studies.comparison import POLICIES
 from handeye.types import Pose
@@ -219,18 +220,26 @@ def _drive(job: _Job) -> Drive:
         shutil.rmtree(scratch, ignore_errors=True)
 
 
+class _Memory(Observer):
+    """Remembers what was believed after each number of views."""
+
+    def __init__(self) -> None:
+        self.known: dict[int, Estimate] = {}
+        self._views = 0
+
+    def taken(self, entry: Entry, estimate: Estimate | None) -> None:
+        """Remember the estimate, which is the one before this attempt."""
+        if estimate is not None:
+            self.known[self._views] = estimate
+        self._views += entry.view is not None
+
+
 def _driven(job: _Job, folder: Path) -> Drive:
-    prepared = prepare(job.options.configuration(job.policy, job.seed))
+    memory = _Memory()
+    prepared = prepare(job.options.configuration(job.policy, job.seed), observer=memory)
     if prepared.truth is None or prepared.truth.X is None:
         raise SolveError("a simulated cell without truth")
-    known: dict[int, Estimate] = {}
-
-    def remember(entry: Entry, estimate: Estimate | None) -> None:
-        if estimate is not None:  # as it was before this attempt
-            views = sum(1 for e in store.entries if e.view is not None) - (entry.view is not None)
-            known[views] = estimate
-
-    session, store = begin(prepared, folder, remember)
+    session, store = begin(prepared, folder)
     try:
         end = session.run()
         store.reveal(prepared.truth)
@@ -242,7 +251,7 @@ def _driven(job: _Job, folder: Path) -> Drive:
         raise SolveError(f"cell {job.seed}, {job.policy}: {end.sentence}", code=end.reason)
     numbers = job.options.views
     # A run that ends early keeps what it has.
-    earlier = [known[views] for views in numbers[:-1] if views in known]
+    earlier = [memory.known[views] for views in numbers[:-1] if views in memory.known]
     rows = [_row(estimate.X, estimate.within_95, prepared.truth.X) for estimate in earlier]
     rows += [_row(answer.X, end.reach, prepared.truth.X)] * (len(numbers) - len(rows))
     mm, deg, within_mm, within_deg = np.array(rows).T

@@ -1,0 +1,141 @@
+"""The options of the page in the browser, and how commands show it."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter, validators
+
+from handeye.datasets.writing import write_file
+from handeye.errors import InputError
+from handeye.estimation import Estimate, Measurements
+from handeye.importing import Opened
+from handeye.robots import Arm
+from handeye.session import End, Session, SessionStore
+from handeye.session.drivers import MANUAL, Person
+
+if TYPE_CHECKING:
+    from handeye.session.configuration import Prepared
+    from handeye.session.deciding import Considered
+    from handeye.ui import Server
+
+# How the formats that a folder is watched for begin.
+_BEGINNINGS = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg", b"BM": "bmp", b"II*\x00": "tif", b"MM\x00*": "tif"}
+
+
+@Parameter(name="*", group="Page in the browser")
+@dataclass(frozen=True)
+class Page:
+    """A page that shows everything and from which a session is driven."""
+
+    ui: bool = False
+    """Show it in the browser, at the address that is printed."""
+    ui_host: str = "127.0.0.1"
+    """Address to listen on. Beyond this machine (such as 0.0.0.0) the printed address holds a token, without
+    which nobody sees anything; the traffic is not encrypted."""
+    ui_port: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=65535))] = 0
+    """Port to listen on; any that is free without it."""
+
+
+class Live:
+    """The page of a session: what the session is told to do comes from there.
+
+    Parameters
+    ----------
+    page
+        Where it listens.
+    driver, images
+        Of the session; a picture that is brought to the page goes into a watched folder.
+    """
+
+    def __init__(self, page: Page, driver: str, images: str) -> None:
+        from handeye.ui import Dashboard, Hub, Pace, Server  # noqa: PLC0415 - other commands need no server
+
+        self.hub = Hub()
+        self.observer = Dashboard(self.hub)
+        self._pace = Pace(waits=driver.partition(":")[0] != MANUAL)
+        kind, _, folder = images.partition(":")
+        upload = _Upload(Path(folder)) if kind == "folder" else None
+        self._server = Server(self.hub, page.ui_host, page.ui_port, pictures=self.observer, upload=upload)
+        self.person = Person(self.hub.ask, self.hub.say)
+        self.confirm = self._pace.confirm
+        announce(self._server)
+
+    def run(self, session: Session, store: SessionStore, prepared: "Prepared") -> End:
+        """Run a session as people at the page ask for it."""
+        from handeye.ui import drive  # noqa: PLC0415
+
+        try:
+            return drive(session, store, prepared, self.observer, self._pace)
+        finally:
+            self._server.close()
+
+
+class _Upload:
+    """Puts pictures that are brought into the folder that a session watches."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._count = folder, 0
+
+    def __call__(self, content: bytes) -> str:
+        ending = next((e for start, e in _BEGINNINGS.items() if content.startswith(start)), None)
+        if ending is None:
+            raise InputError("not a picture: expected PNG, JPEG, BMP or TIFF", code="bad_image")
+        while True:
+            self._count += 1
+            path = self._folder / f"brought_{self._count:03d}.{ending}"
+            if not path.exists():
+                break
+        write_file(path, content)
+        return f"The picture was written as {path.name}."
+
+
+def show_views(
+    page: Page,
+    opened: Opened,
+    measurements: Measurements,
+    estimate: Estimate,
+    *,
+    arm: Arm | None = None,
+    description: str | None = None,
+    considered: "Considered | None" = None,
+    chosen: str | None = None,
+) -> "Server":
+    """Serve a page about views that are there already, and return its server."""
+    from handeye.ui import Hub, Server, Still  # noqa: PLC0415 - other commands need no server
+    from handeye.ui.documents import Shown  # noqa: PLC0415
+
+    hub: Hub = Hub()
+    joints = [view.joints_rad for view in measurements.views]
+    shown = Shown(
+        measurements.mounting,
+        measurements.camera,
+        measurements.target,
+        arm if all(q is not None for q in joints) else None,
+        measurements.views,
+        estimate,
+        considered=considered,
+        chosen=chosen,
+        rejected={**measurements.rejected, **dict(opened.missed)},
+    )
+    still = Still(hub, shown, opened.folder, opened.recording.name, description)
+    return Server(hub, page.ui_host, page.ui_port, pictures=still)
+
+
+def announce(server: "Server") -> None:
+    """Say on stderr where the page is."""
+    print(f"page: {server.address}", file=sys.stderr, flush=True)
+
+
+def serve(server: "Server") -> None:
+    """Keep a page open until Ctrl-C."""
+    announce(server)
+    print("Ctrl-C ends it", file=sys.stderr, flush=True)
+    try:
+        Event().wait()
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+    finally:
+        server.close()

@@ -1,0 +1,345 @@
+"""What a page is told, as plain values: the scene, the candidates, what is known, the last picture."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from handeye import _core
+from handeye.cameras.protocol import Grey
+from handeye.detection import Detection
+from handeye.estimation import Estimate, Measurements
+from handeye.estimation.confidence import ellipsoid
+from handeye.estimation.estimate import corrected
+from handeye.robots import Arm
+from handeye.robots.frames import frames_of
+from handeye.robots.protocol import Goal, Reading
+from handeye.session.deciding import Considered
+from handeye.types import Camera, Mounting, Pose, Target, View
+from handeye.types.arrays import FloatArray, IndexArray
+from handeye.types.calibration import MM_PER_M
+
+# How large the longest axis of an ellipsoid is drawn, and an arrow of the usual residual.
+DRAWN_M, DRAWN_PX = 0.06, 30.0
+# Cells of the picture in which points are counted.
+_COVERAGE = (8, 6)
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """What a camera showed last; `detection` is None where the target was not found."""
+
+    number: int
+    label: str
+    image: Grey | None
+    detection: Detection | None
+    T_base_flange: Pose | None
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """Everything that a page shows, as values that do not change.
+
+    Parameters
+    ----------
+    standing, goal
+        Where the arm is, and where it should go; None if nobody knows.
+    considered
+        Candidates of the last decision, None if there was none.
+    known
+        Views, and the 95 % radii in mm and deg that were stated after so many.
+    gains
+        Views, the gain predicted for the one that was taken then, and the gain that it brought.
+    """
+
+    mounting: Mounting
+    camera: Camera
+    target: Target
+    arm: Arm | None = None
+    views: tuple[View, ...] = ()
+    estimate: Estimate | None = None
+    standing: Reading | None = None
+    goal: Goal | None = None
+    considered: Considered | None = None
+    chosen: str | None = None
+    picture: Picture | None = None
+    known: tuple[tuple[int, float, float], ...] = ()
+    gains: tuple[tuple[int, float, float | None], ...] = ()
+    asked: tuple[float, float] | None = None
+    rejected: dict[str, str] = field(default_factory=dict[str, str])
+
+
+def scene(shown: Shown) -> dict[str, Any]:
+    """Return what stands where, in the frame of the robot's base, metres."""
+    estimate, standing = shown.estimate, shown.standing
+    at = None if standing is None else standing.T_base_flange
+    if at is None and shown.views:
+        at = shown.views[-1].T_base_flange
+    return {
+        "mounting": shown.mounting.value,
+        "arm": _frames(shown.arm, None if standing is None else standing.joints_rad),
+        "ghost": _frames(shown.arm, None if shown.goal is None else shown.goal.joints_rad),
+        "flange": None if at is None else _flat(at.matrix),
+        "boards": _boards(shown, at),
+        "cameras": _cameras(shown, at),
+        "views": [
+            {"name": view.name, "pose": _flat(pose)}
+            for view, pose in zip(shown.views, _moving(shown, _poses(shown.views)), strict=True)
+        ],
+        "goal": None
+        if shown.goal is None
+        else _flat(_moving(shown, shown.goal.T_base_flange.matrix[None])[0]),
+        "ellipsoids": [] if estimate is None or at is None else _ellipsoids(shown, estimate, at),
+        "opening": _opening(shown.camera),
+    }
+
+
+def candidates(shown: Shown) -> dict[str, Any]:
+    """Return where the camera, or the target, could go, with the gain of each or why it may not."""
+    considered = shown.considered
+    if considered is None:
+        return {"poses": [], "gains": [], "names": [], "chosen": None, "ruled_out": [], "reasons": []}
+    pool = considered.pool
+    poses = np.array([c.T_base_flange.matrix for c in pool.candidates]).reshape(-1, 4, 4)
+    reasons = sorted(set(considered.reasons))
+    return {
+        "poses": _many(_moving(shown, poses)),
+        "gains": [None if np.isnan(gain) else round(float(gain), 4) for gain in considered.gains],
+        "names": [candidate.name for candidate in pool.candidates],
+        "chosen": shown.chosen,
+        "ruled_out": _many(_moving(shown, considered.ruled_out)),
+        "reason_of": [reasons.index(reason) for reason in considered.reasons],
+        "reasons": reasons,
+    }
+
+
+def knowledge(shown: Shown) -> dict[str, Any]:
+    """Return the curves of what was stated and asked, gains, and what limits the accuracy now."""
+    estimate = shown.estimate
+    now = None if estimate is None or not estimate.determined else estimate.within_95.to_dict()
+    shares: list[dict[str, Any]] = []
+    sentence = None
+    if estimate is not None:
+        noise = estimate.noise
+        shares = [{"name": name, "share": share} for name, share in noise.evidence.items() if share > 0.005]
+        sentence = None if estimate.attribution is None else estimate.attribution.sentence
+    return {
+        "now": now,
+        "asked": None if shown.asked is None else dict(zip(("mm", "deg"), shown.asked, strict=True)),
+        "curve": [{"views": n, "mm": mm, "deg": deg} for n, mm, deg in shown.known],
+        "gains": [{"views": n, "predicted": p, "realised": r} for n, p, r in shown.gains],
+        "shares": shares,
+        "sentence": sentence,
+        "open": [] if estimate is None else [direction.sentence for direction in estimate.unobservable],
+    }
+
+
+def views(shown: Shown) -> dict[str, Any]:
+    """Return a row for each view, and where in the picture the views have seen the target."""
+    width, height = shown.camera.size_px
+    counts = np.zeros(_COVERAGE[::-1], dtype=int)
+    rows: list[dict[str, Any]] = []
+    right = _put_right(shown)
+    for view, put_right in zip(shown.views, right, strict=True):
+        column = np.clip(view.pixels[:, 0] / width * _COVERAGE[0], 0, _COVERAGE[0] - 1).astype(int)
+        row = np.clip(view.pixels[:, 1] / height * _COVERAGE[1], 0, _COVERAGE[1] - 1).astype(int)
+        np.add.at(counts, (row, column), 1)
+        off = _residuals(shown, put_right.T_base_flange, view.point_ids, view.pixels)[1]
+        rmse = None if off is None or len(off) == 0 else float(np.sqrt(np.square(off).sum(axis=1).mean()))
+        rows.append({"name": view.name, "points": len(view), "rmse_px": rmse})
+    rejected = [{"name": name, "why": why} for name, why in shown.rejected.items()]
+    return {"views": rows, "rejected": rejected, "coverage": counts.tolist(), "size": [width, height]}
+
+
+def picture(shown: Shown) -> dict[str, Any] | None:
+    """Return what is drawn over the last picture, None without one."""
+    return None if shown.picture is None else drawn_over(shown, shown.picture)
+
+
+def picture_of_view(shown: Shown, name: str) -> dict[str, Any] | None:
+    """Return what is drawn over the picture of a view, None if there is no such view."""
+    for number, view in enumerate(shown.views):
+        if view.name == name:
+            detection = Detection(view.point_ids, view.pixels)
+            picture = Picture(-1 - number, name, None, detection, view.T_base_flange)
+            return drawn_over(shown, picture) | {"has_image": view.image is not None}
+    return None
+
+
+def drawn_over(shown: Shown, last: Picture) -> dict[str, Any]:
+    """Return the points of a picture, where they were expected, and how large arrows are drawn."""
+    width, height = shown.camera.size_px
+    answer: dict[str, Any] = {
+        "number": last.number,
+        "label": last.label,
+        "size": [width, height],
+        "has_image": last.image is not None,
+        "found": None,
+        "predicted": None,
+        "rmse_px": None,
+        "magnification": 1,
+    }
+    if last.detection is None:
+        return answer
+    pixels = last.detection.pixels
+    answer["found"] = _listed(pixels)
+    if last.T_base_flange is not None:
+        at = _corrected_pose(shown, last.T_base_flange)
+        predicted, off = _residuals(shown, at, last.detection.point_ids, pixels)
+        if predicted is not None and off is not None and len(off):
+            rmse = float(np.sqrt(np.square(off).sum(axis=1).mean()))
+            answer |= {
+                "predicted": _listed(predicted),
+                "rmse_px": rmse,
+                "magnification": round_factor(DRAWN_PX / max(rmse, 1e-3)),
+            }
+    return answer
+
+
+def round_factor(factor: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20 ... that is not above a factor."""
+    if factor <= 1:
+        return 1
+    tens = 10.0 ** np.floor(np.log10(factor))
+    return float(max(step * tens for step in (1, 2, 5) if step * tens <= factor * (1 + 1e-9)))
+
+
+def _poses(views: Sequence[View]) -> FloatArray:
+    return np.array([view.T_base_flange.matrix for view in views]).reshape(-1, 4, 4)
+
+
+def _moving(shown: Shown, flanges: FloatArray) -> FloatArray:
+    """(N, 4, 4) poses in the base of what moves with the flange, at poses (N, 4, 4) of the flange."""
+    if shown.estimate is None:
+        return flanges
+    in_hand = shown.mounting is Mounting.EYE_IN_HAND
+    return flanges @ (shown.estimate.X.inverse() if in_hand else shown.estimate.Y).matrix
+
+
+def _boards(shown: Shown, at: Pose | None) -> list[dict[str, Any]]:
+    estimate = shown.estimate
+    if estimate is None:
+        return []
+    pose = estimate.Y
+    if shown.mounting is Mounting.EYE_TO_HAND:
+        if at is None:
+            return []
+        pose = at @ pose
+    points = shown.target.points
+    return [
+        {
+            "name": "target",
+            "pose": _flat(pose.matrix),
+            "points": np.round(points, 5).tolist(),
+            "low": points.min(axis=0).tolist(),
+            "high": points.max(axis=0).tolist(),
+        }
+    ]
+
+
+def _cameras(shown: Shown, at: Pose | None) -> list[dict[str, Any]]:
+    estimate = shown.estimate
+    if estimate is None:
+        return []
+    pose = estimate.X.inverse()
+    if shown.mounting is Mounting.EYE_IN_HAND:
+        if at is None:
+            return []
+        pose = at @ pose
+    return [{"name": "camera", "pose": _flat(pose.matrix)}]
+
+
+def _opening(camera: Camera) -> list[float]:
+    """Half the width and the height of what a camera sees at a distance of one."""
+    width, height = camera.size_px
+    fx, fy = camera.parameters[:2]
+    return [round(float(width / 2 / fx), 4), round(float(height / 2 / fy), 4)]
+
+
+def _ellipsoids(shown: Shown, estimate: Estimate, at: Pose) -> list[dict[str, Any]]:
+    """Return 95 % ellipsoids of the camera's centre, and of a point at the target as the camera sees it."""
+    if not estimate.determined:
+        return []
+    A = shown.mounting.chain(at)
+    T_camera_target = estimate.X @ A @ estimate.Y
+    in_hand = shown.mounting is Mounting.EYE_IN_HAND
+    T_base_camera = at @ estimate.X.inverse() if in_hand else estimate.X.inverse()
+    aim = T_camera_target.act(shown.target.points.mean(axis=0, keepdims=True))[0]
+    covariance = estimate.hand_eye_covariance
+    found: list[dict[str, Any]] = []
+    for name, point in (("camera", np.zeros(3)), ("a point at the target", aim)):
+        x, y, z = point
+        jacobian = np.hstack([np.eye(3), -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])])
+        region = ellipsoid(jacobian @ covariance @ jacobian.T, estimate.degrees_of_freedom)
+        factor = round_factor(DRAWN_M / max(float(region.semi_axes_m[0]), 1e-9))
+        axes = (T_base_camera.rotation @ region.directions.T).T * region.semi_axes_m[:, np.newaxis] * factor
+        found.append(
+            {
+                "name": name,
+                "middle": _rounded(T_base_camera.act(point[np.newaxis])[0]),
+                "axes": [_rounded(axis) for axis in axes],
+                "magnification": factor,
+                "longest_mm": MM_PER_M * float(region.semi_axes_m[0]),
+            }
+        )
+    return found
+
+
+def _put_right(shown: Shown) -> tuple[View, ...]:
+    """Return the views with robot poses as the arm stands by what is known of it."""
+    estimate = shown.estimate
+    if estimate is None or not shown.views:
+        return shown.views
+    measurements = Measurements(shown.mounting, shown.camera, shown.target, shown.views, ())
+    return corrected(measurements, estimate.kinematics, estimate.arm_correction).views
+
+
+def _corrected_pose(shown: Shown, T_base_flange: Pose) -> Pose:
+    """Return the corrected pose of the view that was taken there, or the pose itself."""
+    for view, right in zip(shown.views, _put_right(shown), strict=True):
+        if view.T_base_flange == T_base_flange:
+            return right.T_base_flange
+    return T_base_flange
+
+
+def _residuals(
+    shown: Shown,
+    T_base_flange: Pose,
+    ids: IndexArray,
+    pixels: FloatArray,
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return where points are predicted (N, 2), and by how much those in sight are off."""
+    estimate = shown.estimate
+    if estimate is None:
+        return None, None
+    chain = estimate.X @ shown.mounting.chain(T_base_flange) @ estimate.Y
+    target, camera = shown.target, estimate.camera
+    predicted, seen = _core.project_features(
+        camera.lens, camera.parameters, chain.matrix, target.points[ids], target.radii_m[ids]
+    )
+    if not np.all(seen):
+        return None, (pixels - predicted)[seen]
+    return predicted, pixels - predicted
+
+
+def _frames(arm: Arm | None, joints: Sequence[float] | None) -> list[list[float]] | None:
+    if arm is None or joints is None or len(joints) != len(arm):
+        return None
+    return _many(frames_of(arm, np.array(joints)[np.newaxis])[0])
+
+
+def _listed(pixels: FloatArray) -> list[list[float]]:
+    return np.round(pixels, 2).tolist()
+
+
+def _many(poses: FloatArray) -> list[list[float]]:
+    return np.round(poses[:, :3], 4).reshape(len(poses), 12).tolist()
+
+
+def _flat(pose: FloatArray) -> list[float]:
+    return _rounded(pose[:3].ravel())
+
+
+def _rounded(values: FloatArray) -> list[float]:
+    return [round(float(value), 5) for value in values]

@@ -1,0 +1,112 @@
+"""Documents with versions, commands, and the one page that drives."""
+
+import json
+import threading
+
+import pytest
+
+from handeye.errors import InputError
+from handeye.ui.hub import MOST_WATCHERS, Command, Hub
+
+ANNE, BERT = "a" * 16, "b" * 16
+
+
+def test_a_document_is_made_when_it_is_asked_for_and_once() -> None:
+    hub, made = Hub(), list[int]()
+    hub.publish("scene", lambda: made.append(1) or {"x": len(made)})
+    assert made == []
+    assert json.loads(hub.document("scene")) == {"version": 1, "data": {"x": 1}}
+    assert hub.document("scene") == hub.document("scene")
+    assert made == [1]
+    hub.publish("scene", lambda: {"x": 7})
+    assert json.loads(hub.document("scene")) == {"version": 2, "data": {"x": 7}}
+    with pytest.raises(InputError, match="no document"):
+        hub.document("secrets")
+
+
+def test_waiting_ends_with_a_change() -> None:
+    hub = Hub()
+    seen = hub.versions()
+    threading.Timer(0.05, lambda: hub.publish("scene", dict)).start()
+    assert hub.wait(seen, 10.0) == seen | {"scene": 1}
+
+
+def test_the_first_page_drives_until_another_takes_over() -> None:
+    hub = Hub()
+    hub.enter(ANNE)
+    hub.enter(BERT)
+    hub.command(ANNE, Command("go"))
+    with pytest.raises(InputError, match="another one drives"):
+        hub.command(BERT, Command("go"))
+    hub.take_over(BERT)
+    with pytest.raises(InputError, match="another one drives"):
+        hub.command(ANNE, Command("skip"))
+    hub.command(BERT, Command("skip"))
+    assert [hub.next_command(0), hub.next_command(0), hub.next_command(0)] == [
+        Command("go"),
+        Command("skip"),
+        None,
+    ]
+    with pytest.raises(InputError, match="does not look on"):
+        hub.take_over("c" * 16)
+
+
+def test_a_page_that_is_loaded_again_still_drives() -> None:
+    hub = Hub()
+    hub.enter(ANNE)
+    hub.leave(ANNE)
+    hub.enter(BERT)
+    hub.enter(ANNE)
+    hub.command(ANNE, Command("go"))
+
+
+def test_everybody_may_stop_and_the_session_waits_afterwards() -> None:
+    hub, stopped = Hub(), list[str]()
+    hub.on_stop(lambda: stopped.append("stopped"))
+    hub.enter(ANNE)
+    hub.enter(BERT)
+    hub.command(BERT, Command("stop"))
+    assert stopped == ["stopped"]
+    assert hub.next_command(0) == Command("pause")
+    hub.on_stop(lambda: "no answer within 5 s")
+    hub.command(ANNE, Command("stop"))
+    assert "NOT confirmed: no answer within 5 s" in json.loads(hub.document("talk"))["data"]["messages"][-1]
+
+
+def test_a_question_is_answered_once_by_who_drives_or_ended_by_a_stop() -> None:
+    hub, answers = Hub(), list[str]()
+    hub.enter(ANNE)
+
+    def ask() -> None:
+        try:
+            answers.append(hub.ask("pose?"))
+        except EOFError:
+            answers.append("stopped")
+
+    for press in ("answer", "stop"):
+        asking = threading.Thread(target=ask)
+        asking.start()
+        question = None
+        while question is None:
+            question = json.loads(hub.document("talk"))["data"]["question"]
+        with pytest.raises(InputError, match="not open any more"):
+            hub.command(ANNE, Command("answer", {"id": "other", "text": "1 2 3"}))
+        hub.command(ANNE, Command(press, {"id": question["id"], "text": "1 2 3"}))
+        asking.join(10)
+    assert answers == ["1 2 3", "stopped"]
+
+
+def test_too_many_watchers_are_refused() -> None:
+    hub = Hub()
+    for _ in range(MOST_WATCHERS):
+        hub.enter(ANNE)
+    with pytest.raises(InputError, match="look on already"):
+        hub.enter(BERT)
+
+
+@pytest.mark.parametrize("action", ["move_to", "", "__init__"])
+def test_unknown_actions_are_refused(action: str) -> None:
+    hub = Hub()
+    hub.enter(ANNE)
+    with pytest.raises(InputError, match="no action"):
+        hub.command(ANNE, Command(action))
