@@ -125,6 +125,6 @@ def _texture(target: Target) -> tuple[NDArray[np.uint8], FloatArray, FloatArray]
     columns, rows = (int(n) for n in np.ceil((high - low) / texel))
     x = low[0] + (np.arange(columns) + 0.5) * (high[0] - low[0]) / columns
     y = low[1] + (np.arange(rows) + 0.5) * (high[1] - low[1]) / rows
-    plane = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    plane = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
     dark = pattern.is_dark(plane).reshape(rows, columns)
     return np.where(dark, np.uint8(25), np.uint8(230)), low, high

@@ -1,8 +1,8 @@
 """KinHEC's tracks through its own benchmark: its reference solvers, and ours as one more row.
 
-KinHEC (Aiersilan; PyPI `kinhec`, MIT) holds tracks of poses with truth. Its benchmark pairs the streams, picks
-key frames and measures; here `benchmark.SOLVERS` is given ours, which sees the same poses and nothing else,
-and states a region beside its answer.
+KinHEC (Aiersilan; PyPI `kinhec`, MIT) holds tracks of poses with truth. Its benchmark pairs the streams,
+picks key frames and measures; here `benchmark.SOLVERS` is given ours, which sees the same poses and nothing
+else, and states a region beside its answer.
 """
 
 import importlib
@@ -20,6 +20,7 @@ from handeye.errors import InputError
 from handeye.importing.poses_alone import PosesSolved, solve_poses
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
+from handeye.types.pose import inverses
 from handeye.validation import metrics
 
 OURS = "handeye"
@@ -72,7 +73,7 @@ class _Ours:
     def __call__(self, data: tuple[FloatArray, ...], random: np.random.Generator) -> dict[str, FloatArray]:
         del random
         flange, other = data[:2]
-        seen = np.linalg.inv(other) if self.mounting is Mounting.EYE_IN_HAND else other
+        seen = inverses(other) if self.mounting is Mounting.EYE_IN_HAND else other
         found = solve_poses(pose_pairs(self.mounting, flange, seen))
         camera, target = found.X.inverse(), found.Y
         if self.X_true is not None:

@@ -208,8 +208,8 @@ def study_policies(
     wanted = (OURS, *(policy for policy in policies if policy != OURS))
     jobs = [
         _Job(number, mounting, arm, tuple(budgets), wanted, seed)
-        for mounting in mountings
         for number in range(trials)
+        for mounting in mountings
     ]
     done = run_all(_run, jobs, workers=workers, progress=progress)
     reached: dict[tuple[Mounting, int], dict[str, tuple[Reached, ...]]] = {}

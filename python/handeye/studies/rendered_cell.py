@@ -35,6 +35,8 @@ VIEWS = 8
 POOL = 40
 # Border that no point of a candidate's target may touch, and its steepest view.
 MARGIN_PX, STEEPEST_RAD = 15.0, np.deg2rad(50.0)
+# Smaller squares have markers that nobody reads.
+SMALLEST_SQUARE_PX = 16.0
 # Where the base stands in their world; the place on the rail is ours.
 T_WORLD_BASE = np.array([0.3, 0.0, 0.2])
 MOST_ATTEMPTS = 60
@@ -118,7 +120,7 @@ def cameras() -> tuple[CellCamera, ...]:
                 _pinhole(fovy),
                 _world(place, _mujoco_camera(wxyz)).inverse(),
                 Pose(held),
-                (0.6, 1.6),
+                (0.5, 1.4),
             )
             for name, fovy, place, wxyz in fixed
         ),
@@ -206,7 +208,7 @@ def study_rendered_cell(
 def _start(one: CellCamera, pictures: MujocoPictures, arm: str, number: int, seed: int) -> Start:
     random = np.random.default_rng([seed, 6, number, len(one.name)])
     robot = simulated_arm()
-    pool = _pool(one, random)
+    pool = draw_pool(one, random)
     moving = SimulatedArm(robot, ARMS[arm], int(random.integers(2**31)), pool.candidates[0].joints_rad or ())
 
     def measured(candidate: Candidate) -> View | None:
@@ -254,7 +256,7 @@ def _start(one: CellCamera, pictures: MujocoPictures, arm: str, number: int, see
     )
 
 
-def _pool(one: CellCamera, random: np.random.Generator) -> Pool:
+def draw_pool(one: CellCamera, random: np.random.Generator) -> Pool:
     """Draw postures that show the whole target to the camera."""
     arm = simulated_arm()
     found: list[Candidate] = []
@@ -290,10 +292,20 @@ def _drawn(one: CellCamera, random: np.random.Generator) -> FloatArray:
     return pose
 
 
+def _smallest_step(points: FloatArray, pixels: FloatArray) -> float:
+    """Shortest distance in the picture between corners that are neighbours on the board, px."""
+    apart = np.linalg.norm(points[:, np.newaxis] - points, axis=2)
+    seen = np.linalg.norm(pixels[:, np.newaxis] - pixels, axis=2)
+    neighbours = (apart > 0) & (apart < 1.01 * apart[apart > 0].min())
+    return float(np.min(seen[neighbours]))
+
+
 def _is_whole(one: CellCamera, T_camera_target: FloatArray) -> bool:
     points = one.target.points @ T_camera_target[:3, :3].T + T_camera_target[:3, 3]
     pixels, seen = _core.project(one.camera.lens, one.camera.parameters, points)
-    # The border of squares outside the inner corners must be in sight too.
+    # The border of squares outside the inner corners must be in sight too, and its markers be legible.
     square = np.ptp(pixels, axis=0).max() / 3
+    if _smallest_step(points, pixels) < SMALLEST_SQUARE_PX:
+        return False
     inside = (pixels >= MARGIN_PX + square) & (pixels <= np.array(SIZE_PX) - 1 - MARGIN_PX - square)
     return bool(seen.all() and inside.all())
