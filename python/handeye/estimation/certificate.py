@@ -222,10 +222,8 @@ class _System:
             rows[view, row, w], rows[view, row, x] = turned[:, row], -carried[:, row]
         for row in range(3):
             rows[view, 9 + row, x] = -moved[:, row]
-            rows[view, 9 + row, t_w], rows[view, 9 + row, t_x] = (
-                seen[:, row] / sigmas[1],
-                -eye[row] / sigmas[1],
-            )
+            rows[view, 9 + row, t_w] = seen[:, row] / sigmas[1]
+            rows[view, 9 + row, t_x] = -eye[row] / sigmas[1]
         rows[:, 9:, width] = C[:, :3, 3] / sigmas[1]
         flat = rows.reshape(12 * count, -1)
         fixed, free = flat[:, : width + 1], flat[:, width + 1 :]
@@ -317,9 +315,9 @@ def _shortfall(M: FloatArray, z: FloatArray, cost: float) -> float:
     residual, wide = M @ z, M @ across
     gradient = wide.T @ residual - cost * across[-1]
     at_z = across.T @ (constraints @ z).T
-    multipliers = np.linalg.lstsq(at_z, -gradient, rcond=None)[0]
-    F = wide.T @ wide - cost * np.outer(across[-1], across[-1])
-    F += across.T @ np.tensordot(multipliers, constraints, 1) @ across
+    multipliers = np.asarray(np.linalg.lstsq(at_z, -gradient, rcond=None)[0], np.float64)
+    forms: FloatArray = np.tensordot(multipliers, constraints, 1)
+    F = wide.T @ wide - cost * np.outer(across[-1], across[-1]) + across.T @ forms @ across
     size = float(np.linalg.norm(multipliers))
     terms = np.linalg.norm(wide) * np.linalg.norm(residual) + np.linalg.norm(at_z) * size
     row = float(np.linalg.norm(gradient + at_z @ multipliers) + ROUNDING * terms) / length

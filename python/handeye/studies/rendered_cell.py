@@ -261,8 +261,8 @@ def draw_pool(one: CellCamera, random: np.random.Generator) -> Pool:
     arm = simulated_arm()
     found: list[Candidate] = []
     for _ in range(MOST_ATTEMPTS):
-        seen = np.array([_drawn(one, random) for _ in range(100)])
-        seen = seen[[_is_whole(one, pose) for pose in seen]]
+        drawn = [_drawn(one, random) for _ in range(100)]
+        seen: FloatArray = np.array([pose for pose in drawn if _is_whole(one, pose)]).reshape(-1, 4, 4)
         if len(seen) == 0:
             continue
         chain = one.X.inverse().matrix @ seen @ one.Y.inverse().matrix
@@ -297,7 +297,7 @@ def _smallest_step(points: FloatArray, pixels: FloatArray) -> float:
     apart = np.linalg.norm(points[:, np.newaxis] - points, axis=2)
     seen = np.linalg.norm(pixels[:, np.newaxis] - pixels, axis=2)
     neighbours = (apart > 0) & (apart < 1.01 * apart[apart > 0].min())
-    return float(np.min(seen[neighbours]))
+    return min(seen[neighbours].tolist())
 
 
 def _is_whole(one: CellCamera, T_camera_target: FloatArray) -> bool:
