@@ -278,7 +278,7 @@ def draw_pool(one: CellCamera, random: np.random.Generator) -> Pool:
 
 def _drawn(one: CellCamera, random: np.random.Generator) -> FloatArray:
     """Draw `T_camera_target` (4, 4): the target somewhere in the picture, tilted and rolled."""
-    tilt = np.arccos(random.uniform(np.cos(STEEPEST_RAD), 1.0))
+    tilt = float(np.arccos(random.uniform(float(np.cos(STEEPEST_RAD)), 1.0)))
     azimuth, roll = random.uniform(-np.pi, np.pi, 2)
     twists = np.zeros((2, 6))
     twists[0, 5] = roll

@@ -103,9 +103,7 @@ def study_scale(*, trials: int = 400, processes: int = 2, cluster: bool = True, 
     """
     if trials < 40:
         raise InputError(f"{trials} trials, expected at least 40", code="out_of_range")
-    growth: list[tuple[int, float]] = []
-    for count in (trials // 4, trials // 2):
-        growth.append((count, _timed(count, 1, seed)[1]))
+    growth = [(count, _timed(count, 1, seed)[1]) for count in (trials // 4, trials // 2)]
     alone, seconds = _timed(trials, 1, seed)
     growth.append((trials, seconds))
     ways = [Way("one_process", 1, trials, seconds, same=True)]
