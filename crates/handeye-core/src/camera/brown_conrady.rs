@@ -12,7 +12,7 @@
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 
 use super::distortion::DistortedPoint;
-use super::lens::{Model, ParameterJacobian, Parameters};
+use super::lens_model::{Model, ParameterJacobian, Parameters};
 use super::region::{self, MAX_SQUARED_RADIUS};
 use crate::simd::{Scalar, Simd, Vector};
 

@@ -5,7 +5,7 @@
 //! plane at unit depth. Forward, `r' = 2 r / (1 + sqrt(1 - 4 k1 r^2))`.
 
 use super::distortion::DistortedPoint;
-use super::lens::{Model, ParameterJacobian, Parameters};
+use super::lens_model::{Model, ParameterJacobian, Parameters};
 use super::region::MAX_SQUARED_RADIUS;
 
 pub(super) const MODEL: Model =

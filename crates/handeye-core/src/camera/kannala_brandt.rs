@@ -5,7 +5,7 @@
 //! `(x', y') = (x, y) theta_d / r`, `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`.
 
 use super::distortion::DistortedPoint;
-use super::lens::{Model, ParameterJacobian, Parameters};
+use super::lens_model::{Model, ParameterJacobian, Parameters};
 use super::region::{self, MAX_SQUARED_RADIUS};
 
 pub(super) const MODEL: Model = Model {

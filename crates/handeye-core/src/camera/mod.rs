@@ -11,6 +11,7 @@ mod division;
 mod feature;
 mod kannala_brandt;
 mod lens;
+mod lens_model;
 mod observation;
 mod pinhole;
 mod projection_row;
@@ -23,7 +24,8 @@ use crate::error::Error;
 pub(crate) use brown_conrady::{coefficient_derivative, distort};
 pub(crate) use distortion::DistortedPoint;
 pub use feature::Feature;
-pub use lens::{Lens, MAX_PARAMETERS, ParameterJacobian};
+pub use lens::Lens;
+pub use lens_model::{MAX_PARAMETERS, ParameterJacobian};
 pub use observation::Observation;
 pub(crate) use projection_row::{projection_row, restore_signs};
 

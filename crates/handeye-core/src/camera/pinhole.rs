@@ -1,7 +1,7 @@
 //! No distortion.
 
 use super::distortion::DistortedPoint;
-use super::lens::Model;
+use super::lens_model::Model;
 use super::region::MAX_SQUARED_RADIUS;
 use crate::simd::Scalar;
 
