@@ -1,8 +1,9 @@
 //! Entropy, gains and predicted information of candidates.
 
+use crate::call::CallCore;
 use handeye_core::error::Error;
 use handeye_core::information::criteria::{
-    Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, ToolPoint, Trace,
+    Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, Task, ToolPoint, Trace,
 };
 use handeye_core::information::{
     Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, RobotError, Supposition,
@@ -74,7 +75,7 @@ pub struct PyCriterion {
 #[pymethods]
 impl PyCriterion {
     #[new]
-    #[pyo3(signature = (name, *, length_scale_m=1e-3, angle_scale_rad=1e-3, tool_points=None, over="mean"))]
+    #[pyo3(signature = (name, *, length_scale_m=1e-3, angle_scale_rad=1e-3, tool_points=None, over="mean", tasks=None))]
     fn new(
         py: Python<'_>,
         name: &str,
@@ -82,6 +83,7 @@ impl PyCriterion {
         angle_scale_rad: f64,
         tool_points: Option<Array<'_>>,
         over: &str,
+        tasks: Option<Array<'_>>,
     ) -> PyResult<Self> {
         let scales = Scales { length_m: length_scale_m, angle_rad: angle_scale_rad };
         if !(length_scale_m > 0.0 && angle_scale_rad > 0.0) {
@@ -106,12 +108,21 @@ impl PyCriterion {
                 };
                 Box::new(ToolPoint::new(&points, over).map_err(|e| to_python(py, e))?)
             }
+            "task" => {
+                let tasks = tasks.ok_or_else(|| invalid(py, "criterion task needs tasks"))?;
+                let &[count, directions, parameters] = tasks.shape() else {
+                    return Err(invalid(py, "tasks must have shape (P, d, n)"));
+                };
+                let values = convert::in_place(&tasks);
+                let rows = DMatrix::from_row_slice(count * directions, parameters, &values);
+                Box::new(Task::new(rows, count).map_err(|e| to_python(py, e))?)
+            }
             other => {
                 return Err(invalid(
                     py,
                     &format!(
                         "unknown criterion \"{other}\"; there are entropy, entropy_handeye, trace, \
-                         eigenvalue_sum, min_eigenvalue, tool_point"
+                         eigenvalue_sum, min_eigenvalue, tool_point, task"
                     ),
                 ));
             }
@@ -207,11 +218,11 @@ impl Predictor {
             vector_unit.map_or_else(|| Ok(VectorUnit::widest()), |name| self::vector_unit(py, name))?;
         let matrices = convert::row_major::<4, 4>(py, "motions", motions)?;
         let matrices: &[f64] = &matrices;
-        let outcome = py.detach(|| {
+        let outcome = py.core(|| {
             let execution = Execution { unit, threads };
             let criterion = criterion.inner.as_ref();
             self.model().mean_gains(supposed, criterion, Motions::Matrices(matrices), &execution)
-        });
+        })?;
         match outcome {
             Ok(gains) => Ok(convert::scalars_out(py, gains)),
             Err(error @ Error::NotRigid { .. }) => {
@@ -304,7 +315,7 @@ impl Predictor {
             let joints = self.joints(py, arm, motions.len())?.unwrap_or_default();
             let criterion = criterion.inner.as_ref();
             let gains = py
-                .detach(|| self.model().gains_with_joints(&belief.inner, criterion, &motions, &joints))
+                .core(|| self.model().gains_with_joints(&belief.inner, criterion, &motions, &joints))?
                 .map_err(|e| to_python(py, e))?;
             return Ok(convert::scalars_out(py, gains));
         }
@@ -346,7 +357,7 @@ impl Predictor {
         let joints = self.joints(py, arm, motions.len())?;
         let model = self.model();
         let n = model.parameter_count();
-        let all: Vec<DMatrix<f64>> = py.detach(|| {
+        let all: Vec<DMatrix<f64>> = py.core(|| {
             motions
                 .iter()
                 .enumerate()
@@ -356,7 +367,7 @@ impl Predictor {
                         .map_or_else(|| DMatrix::zeros(n, n), |c| &c.factor * c.factor.transpose())
                 })
                 .collect()
-        });
+        })?;
         Ok(convert::dynamics_out(py, &all, n, n))
     }
 }

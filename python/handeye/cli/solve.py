@@ -15,6 +15,7 @@ from handeye.cli.page import Page, serve, show_views
 from handeye.cli.solve_poses import answer_for_poses
 from handeye.cli.solve_rig import answer_for_rig
 from handeye.cli.source import Source, mindful_of
+from handeye.cli.work import WorkOptions, touch_lines
 from handeye.datasets import PosePairs
 from handeye.estimation import Measurements, make_estimator
 from handeye.estimation import solve as solve_recording
@@ -40,6 +41,7 @@ def solve(
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
+    work: WorkOptions = WorkOptions(),  # noqa: B008 - frozen
     page: Page = Page(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
@@ -86,7 +88,12 @@ def solve(
     with mindful_of(opened.warnings):
         kinematics = arm.kinematics(opened.recording.views, model)
         calibration = solve_recording(
-            opened.recording, model, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed
+            opened.recording,
+            model,
+            reduced=reduced,
+            kinematics=kinematics,
+            camera_fixed=camera_fixed,
+            work=work.work(),
         )
     region = position_region(calibration)
     data = _data(opened, calibration, region)
@@ -182,6 +189,7 @@ def _show(
             ("accuracy", f"{stated} with 95 % probability (centre of the camera, rotation)"),
             ("standard deviation", f"{accuracy} of position and rotation"),
             ("95 % ellipsoid", f"of the position, semi-axes {axes} mm"),
+            *(() if calibration.touch is None else touch_lines(calibration.touch)),
             ("residuals", residuals),
             ("noise", _noise(calibration)),
             *((f"joint {offset.joint}", _offset(offset)) for offset in calibration.joint_offsets),
