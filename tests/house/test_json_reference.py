@@ -217,6 +217,8 @@ def test_twin(handeye: Handeye) -> None:
 def test_simulated_studies(handeye: Handeye) -> None:
     data = handeye.json("study", "methods", "--trials", "1", "--workers", "1")
     compare("handeye study methods", data)
+    scale = handeye.json("study", "scale", "--trials", "40", "--workers", "1", "--no-cluster")
+    compare("handeye study scale", scale)
     few = ("--trials", "1", "--workers", "1")
     compare("handeye study policies", handeye.json("study", "policies", "--budgets", "5", *few))
     one_step = ("--candidates", "3", "--draws", "2", "--arm", "exact")
