@@ -12,7 +12,7 @@ author = "the handeye contributors"
 project_copyright = "the handeye contributors"
 version = release = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
 
-extensions = ["myst_parser", "mathml_formulas"]
+extensions = ["myst_parser", "mathml_formulas", "generated_reference"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build", "_extensions"]
