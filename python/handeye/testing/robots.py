@@ -7,7 +7,10 @@ import pytest
 from handeye.errors import DeviceError
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Robot
+from handeye.robots.replay import is_near
 from handeye.session.contract import (
+    REST_M,
+    REST_RAD,
     SECONDS,
     arrival,
     interrupted,
@@ -106,7 +109,12 @@ class RobotTests:
         _, error = interrupted(robot, slow, cut)
         assert isinstance(error, DeviceError), f"{error!r}, expected DeviceError"
         mend()
-        assert read(robot) is not None, "the pose cannot be read once the connection is back"
+        first, second = read(robot), read(robot)
+        assert first is not None, "the pose cannot be read once the connection is back"
+        assert second is not None, "the pose cannot be read once the connection is back"
+        assert is_near(first.T_base_flange, second.T_base_flange, REST_M, REST_RAD), (
+            "the arm moves on without a connection"
+        )
         short = arrival(_Still(robot), slow)
         assert short, "the arm went on to its goal without a connection"
         assert arrival(robot, goals[1]) == []
