@@ -6,12 +6,16 @@ The pages are made anew with every build, into `docs/reference`, and are not und
 import ast
 import importlib
 import inspect
+import io
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from rich.console import Console
 from sphinx.application import Sphinx
 from sphinx.util.typing import ExtensionMetadata
+
+from handeye.cli.app import COMMANDS, make_app
 
 ROOMS = ("handeye", "handeye.types", "handeye.errors", "handeye.datasets", "handeye.detection")
 ROOMS += ("handeye.estimation", "handeye.planning", "handeye.robots", "handeye.cameras", "handeye.session")
@@ -117,12 +121,14 @@ def core_page(stub: Path) -> str:
 
 def command_page() -> str:
     """Return the page of all commands, as `--help` has them."""
-    from handeye.cli.app import COMMANDS, make_app
-    from rich.console import Console
-
-    lines = ["# Command line", "", "What `handeye COMMAND --help` prints. How to: [commands](../commands/index.md).", ""]
+    lines = [
+        "# Command line",
+        "",
+        "What `handeye COMMAND --help` prints. How to: [commands](../commands/index.md).",
+        "",
+    ]
     for name, _, line in COMMANDS:
-        console = Console(width=100, record=True, file=open("/dev/null", "w"), force_terminal=False)  # noqa: PTH123, SIM115
+        console = Console(width=100, record=True, file=io.StringIO(), force_terminal=False)
         make_app(name).help_print([name], console=console)
         text = "\n".join(part.rstrip() for part in console.export_text().strip().splitlines())
         lines += [f"## handeye {name}", "", line, "", "```text", text, "```", ""]

@@ -40,15 +40,19 @@ def to_mathml(node: nodes.Element, display: str) -> str:
 
 def draw_brackets(root: ET.Element) -> None:
     """Make the brackets around matrices part of the matrix; refuse others that would have to stretch."""
-    for row in root.iter(f"{{{MATHML}}}mrow"):
-        parts = list(row)
-        if [part.tag for part in parts] == BRACKETED and (parts[0].text, parts[2].text) == ("[", "]"):
-            parts[1].set("class", "matrix")
-            row.remove(parts[0])
-            row.remove(parts[2])
+    for parent in list(root.iter()):
+        parts = list(parent)
+        for opening, matrix, closing in zip(parts, parts[1:], parts[2:], strict=False):
+            tags = [opening.tag, matrix.tag, closing.tag]
+            if tags == BRACKETED and (opening.text, closing.text) == ("[", "]"):
+                matrix.set("class", "matrix")
+                parent.remove(opening)
+                parent.remove(closing)
     for operator in root.iter(f"{{{MATHML}}}mo"):
         if operator.get("fence") == "true" and operator.get("stretchy") == "true":
-            raise ValueError(f"a bracket that browsers do not stretch: {operator.text}; write it without \\left")
+            raise ValueError(
+                f"a bracket that browsers do not stretch: {operator.text}; write it without \\left"
+            )
 
 
 def visit_inline(translator: HTML5Translator, node: nodes.math) -> None:
