@@ -324,7 +324,11 @@ class Belief:
     def hand_eye_entropy(self) -> float: ...
 
 class Criterion:
-    """What a view is worth: entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue or tool_point."""
+    """Worth of a view: entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue, tool_point or task.
+
+    `tasks` (P, d, n): rows over all parameters. A view is worth what it takes off the root mean square of the
+    tasks' summed variances.
+    """
 
     def __init__(
         self,
@@ -334,6 +338,7 @@ class Criterion:
         angle_scale_rad: float = 1e-3,
         tool_points: ArrayLike | None = None,
         over: str = "mean",
+        tasks: ArrayLike | None = None,
     ) -> None: ...
     @property
     def name(self) -> str: ...
@@ -409,6 +414,13 @@ class PoseMeasurements:
         free_camera: list[int] | None = None,
         board_scale: bool = False,
     ) -> None: ...
+    @staticmethod
+    def stated(motions: ArrayLike, poses: ArrayLike, covariances: ArrayLike) -> PoseMeasurements:
+        """Poses (K, 4, 4) that somebody else's detector states.
+
+        With the covariance (K, 6, 6) of their left perturbation, and the middle (K, 4, 4) of each chain.
+        """
+
     def __len__(self) -> int: ...
     @property
     def variances_px2(self) -> list[float]: ...
@@ -439,6 +451,8 @@ class Posterior:
     def level_names(self) -> list[str]: ...
     @property
     def levels(self) -> list[list[float]]: ...
+    @property
+    def weights(self) -> list[float]: ...
     @property
     def degrees_of_freedom(self) -> list[float]: ...
     def degrees_of_freedom_of(self, combinations: ArrayLike) -> list[float]:

@@ -106,6 +106,26 @@ impl PoseMeasurements {
         Ok(Self { views })
     }
 
+    /// Poses (K, 4, 4) that somebody else's detector states, with the covariance (K, 6, 6) of their left perturbation.
+    #[staticmethod]
+    fn stated<'py>(
+        py: Python<'py>,
+        motions: Array<'py>,
+        poses: Array<'py>,
+        covariances: Array<'py>,
+    ) -> PyResult<Self> {
+        let motions = convert::transforms(py, "motions", &motions)?;
+        let poses = convert::transforms(py, "poses", &poses)?;
+        let covariances = convert::matrices::<6, 6>(py, "covariances", &covariances)?;
+        if motions.len() != poses.len() || covariances.len() != poses.len() {
+            return Err(invalid(py, "as many motions and covariances as poses are needed"));
+        }
+        let each = motions.into_iter().zip(poses).zip(covariances);
+        let views =
+            each.map(|((motion, pose), covariance)| PoseMeasurement::stated(motion, pose, covariance));
+        Ok(Self { views: views.collect() })
+    }
+
     fn __len__(&self) -> usize {
         self.views.len()
     }
@@ -302,6 +322,12 @@ impl Posterior {
     #[getter]
     fn levels(&self) -> Vec<Vec<f64>> {
         self.inner.nodes.iter().map(|node| node.levels.clone()).collect()
+    }
+
+    /// Share of each node (N,).
+    #[getter]
+    fn weights(&self) -> Vec<f64> {
+        self.inner.nodes.iter().map(|node| node.weight).collect()
     }
 
     /// Degrees of freedom of the covariance of each `X`.

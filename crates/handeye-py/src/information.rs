@@ -2,7 +2,7 @@
 
 use handeye_core::error::Error;
 use handeye_core::information::criteria::{
-    Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, ToolPoint, Trace,
+    Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, Task, ToolPoint, Trace,
 };
 use handeye_core::information::{
     Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, RobotError, Supposition,
@@ -74,7 +74,7 @@ pub struct PyCriterion {
 #[pymethods]
 impl PyCriterion {
     #[new]
-    #[pyo3(signature = (name, *, length_scale_m=1e-3, angle_scale_rad=1e-3, tool_points=None, over="mean"))]
+    #[pyo3(signature = (name, *, length_scale_m=1e-3, angle_scale_rad=1e-3, tool_points=None, over="mean", tasks=None))]
     fn new(
         py: Python<'_>,
         name: &str,
@@ -82,6 +82,7 @@ impl PyCriterion {
         angle_scale_rad: f64,
         tool_points: Option<Array<'_>>,
         over: &str,
+        tasks: Option<Array<'_>>,
     ) -> PyResult<Self> {
         let scales = Scales { length_m: length_scale_m, angle_rad: angle_scale_rad };
         if !(length_scale_m > 0.0 && angle_scale_rad > 0.0) {
@@ -106,12 +107,21 @@ impl PyCriterion {
                 };
                 Box::new(ToolPoint::new(&points, over).map_err(|e| to_python(py, e))?)
             }
+            "task" => {
+                let tasks = tasks.ok_or_else(|| invalid(py, "criterion task needs tasks"))?;
+                let &[count, directions, parameters] = tasks.shape() else {
+                    return Err(invalid(py, "tasks must have shape (P, d, n)"));
+                };
+                let values = convert::in_place(&tasks);
+                let rows = DMatrix::from_row_slice(count * directions, parameters, &values);
+                Box::new(Task::new(rows, count).map_err(|e| to_python(py, e))?)
+            }
             other => {
                 return Err(invalid(
                     py,
                     &format!(
                         "unknown criterion \"{other}\"; there are entropy, entropy_handeye, trace, \
-                         eigenvalue_sum, min_eigenvalue, tool_point"
+                         eigenvalue_sum, min_eigenvalue, tool_point, task"
                     ),
                 ));
             }

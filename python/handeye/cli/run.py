@@ -16,6 +16,7 @@ from handeye.cli.output import check_new_folder
 from handeye.cli.page import Live, Page
 from handeye.cli.run_options import Limits, Simulated, Timeouts
 from handeye.cli.session_report import report_of_session
+from handeye.cli.work import WorkOptions, check_touch
 from handeye.datasets import read_camera, read_target
 from handeye.errors import DetectionError, DeviceError, HandeyeError
 from handeye.estimation import Estimate
@@ -56,6 +57,7 @@ def run(
     mounting: Mounting | None = None,
     accuracy_mm: float = 0.5,
     accuracy_deg: float = 0.05,
+    touch_mm: float | None = None,
     max_views: int = 20,
     seed: Seed = 0,
     model: ModelName = ModelName.AUTO,
@@ -65,6 +67,7 @@ def run(
     dry_run: bool = False,
     confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen, like those below
+    work: WorkOptions = WorkOptions(),  # noqa: B008
     timeouts: Timeouts = Timeouts(),  # noqa: B008
     simulated: Simulated = Simulated(),  # noqa: B008
     page: Page = Page(),  # noqa: B008
@@ -99,6 +102,9 @@ def run(
         Radius within which the camera's position shall lie with 95 % probability.
     accuracy_deg
         The same for its rotation.
+    touch_mm
+        Instead of both: stop when a touch lands within so much with 95 % probability, wherever in the box of
+        work, and choose views for it.
     max_views
         Stop at so many views in any case.
     seed
@@ -117,6 +123,7 @@ def run(
     confirm
         Ask before every motion; the default on a real arm.
     """
+    check_touch(touch_mm)
     if resume:
         if session is None:
             raise UsageError("--resume needs --session", hint="give the folder of the session to go on with")
@@ -157,6 +164,8 @@ def run(
         ),
         patience=timeouts.patience(driver, images),
         simulation=simulated.simulation(),
+        touch_mm=touch_mm,
+        work=work.work(),
     )
     if (driver == SIMULATED) != (images == SIMULATED):
         raise UsageError("--driver and --images are either both simulated or both not")

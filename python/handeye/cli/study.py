@@ -31,6 +31,9 @@ study = App(
 )
 # Imported when it runs.
 study.command(
+    "handeye.cli.study_touch:touch", name="touch", help="Count how often the tool lands where it is said to."
+)
+study.command(
     "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
 )
 study.command(

@@ -4,10 +4,12 @@ import os
 from pathlib import Path
 
 from handeye.datasets import (
+    certifiable,
     easy_handeye2,
     industrial_calibration,
     moveit_samples,
     pose_list,
+    pose_streams,
     recording_format,
     robot_cal_tools,
     rwhe_calib,
@@ -32,6 +34,10 @@ IMPORTERS: dict[str, Importer] = {
         easy_handeye2.IMPORTER,
         moveit_samples.IMPORTER,
         visp.IMPORTER,
+        pose_streams.ETHZ,
+        pose_streams.KINHEC,
+        pose_streams.TUM,
+        certifiable.IMPORTER,
         bags.IMPORTER,
         pose_list.IMPORTER,
     )
@@ -64,10 +70,10 @@ def load(
 
     Returns
     -------
-    LoadedRecording, ImageSet, UnreadPoses, PosePairs or Contents
+    LoadedRecording, ImageSet, UnreadPoses, PosePairs, PoseStreams or Contents
         An `ImageSet` has no points yet: they are still to be detected; of `UnreadPoses` not even the robot's
-        poses are known; `PosePairs` never had pictures; of the `Contents` of a bag it is still to be chosen
-        what counts.
+        poses are known; `PosePairs` and `PoseStreams` never had pictures; of the `Contents` of a bag it is
+        still to be chosen what counts.
 
     Raises
     ------

@@ -109,6 +109,12 @@ class ArmModel:
         displacements[list(self.order)] = constants[len(self.free) :]
         return ArmCorrection(offsets, displacements)
 
+    def parameters(self, correction: ArmCorrection) -> FloatArray:
+        """(k,) what was found of joints and links in the order of the parameters; undoes `correction`."""
+        free = list(self.free)
+        offsets = correction.joint_offsets[free] / self.scales[free]
+        return np.concatenate([offsets, correction.displacements[list(self.order)]])
+
     def offsets(self, constants: FloatArray, covariance: FloatArray) -> tuple[JointOffset, ...]:
         """Name the offsets, of the constants (k,) and their covariance (k, k)."""
         sigmas = np.sqrt(np.diag(covariance)) if len(covariance) else np.zeros(0)

@@ -21,13 +21,15 @@ from handeye.datasets import (
 from handeye.datasets.bags import Contents
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.pose_list import stated_target
+from handeye.datasets.pose_pairs import PoseStreams
 from handeye.datasets.pose_rows import NOTHING_STATED
 from handeye.detection import Detection, Image, Reason, calibrate_camera, detect_all
-from handeye.errors import DetectionError, HandeyeError, InputError
+from handeye.errors import DetectionError, HandeyeError, InputError, UnstatedError
 from handeye.estimation import Measurements
 from handeye.importing.bag_choice import NOTHING_CHOSEN, BagOptions
 from handeye.importing.bags import Timing, pictures_of
 from handeye.importing.readings import compare
+from handeye.importing.streams import pairs_of
 from handeye.importing.unstated import unstated
 from handeye.robots import Arm
 from handeye.types import Camera, Mounting, Recording, Target
@@ -181,11 +183,13 @@ def open_any(
         return _of_recording(loaded, options.camera)
     if isinstance(loaded, PosePairs):
         return loaded
+    if isinstance(loaded, PoseStreams):
+        return pairs_of(loaded)
     if isinstance(loaded, Contents):
         return _of_bag(loaded, options, progress or _nothing)
     if isinstance(loaded, UnreadPoses):
         opened = _of_images(loaded.images, options.camera, progress or _nothing)
-        raise _told_by_pictures(loaded, opened.recording, options.mounting)
+        raise told_by_pictures(loaded, opened.recording, options.mounting)
     return _of_images(loaded, options.camera, progress or _nothing)
 
 
@@ -304,7 +308,7 @@ def _check_size(camera: Camera, size: tuple[int, int], what: str) -> None:
         )
 
 
-def _told_by_pictures(unread: UnreadPoses, recording: Recording, mounting: Mounting | None) -> InputError:
+def told_by_pictures(unread: UnreadPoses, recording: Recording, mounting: Mounting | None) -> UnstatedError:
     """Return the error that says which way to read the robot's poses agrees with the pictures."""
     measurements = Measurements.of_recording(recording)
     places = {shot.name: row for row, shot in enumerate(unread.images.shots)}

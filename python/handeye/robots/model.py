@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from handeye import _core
 from handeye.errors import InputError, SolveError
-from handeye.types.arrays import FloatArray, finite_array
+from handeye.types.arrays import BoolArray, FloatArray, finite_array
 from handeye.types.pose import Pose
 
 MAX_JOINTS = 16
@@ -200,7 +200,7 @@ class Arm:
 
     def inverse_all(
         self, T_base_flange: ArrayLike, start: ArrayLike | None = None, *, attempts: int = 100
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> tuple[FloatArray, BoolArray]:
         """(N, n) joint positions that reach poses (N, 4, 4), and which (N,) are reached.
 
         From one posture (n,) for all or one for each (N, n); rows of poses that are not reached hold the

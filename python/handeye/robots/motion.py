@@ -12,7 +12,7 @@ import numpy as np
 from handeye import _core
 from handeye.errors import HandeyeError, InputError
 from handeye.robots.model import Arm
-from handeye.types.arrays import FloatArray
+from handeye.types.arrays import BoolArray, FloatArray
 from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
 from handeye.types.view import View
@@ -23,6 +23,8 @@ AGREEMENT_M = 0.01
 AGREEMENT_RAD = np.deg2rad(1.0)
 # Fewer views than these do not tell constant frames from a wrong arm.
 MIN_VIEWS_FOR_FRAMES = 4
+# Postures from which a pose is looked for where the one nearby does not lead there.
+REACH_ATTEMPTS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,14 @@ class ArmKinematics:
     def forward(self, joints: FloatArray) -> FloatArray:
         """(K, 4, 4) `T_base_flange` that the controller would report at joints (K, n)."""
         return self.T_base_root.matrix @ self.arm.forward(joints) @ self.T_tip_flange.matrix
+
+    def reach(self, T_base_flange: FloatArray, near: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """(N, n) joint positions at which the controller would report poses (N, 4, 4), and which are reached.
+
+        From postures near (N, n); rows of poses that are not reached hold the nearest posture found.
+        """
+        goals = self.T_base_root.inverse().matrix @ T_base_flange @ self.T_tip_flange.inverse().matrix
+        return self.arm.inverse_all(goals, near, attempts=REACH_ATTEMPTS)
 
     def motion_jacobians(self, mounting: Mounting, joints: FloatArray) -> FloatArray:
         """(K, 6, n) D at joint positions (K, n), radians and metres: truly ``A = exp(D dq) A_reported``.

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from handeye.errors import InputError
+from handeye.estimation.work import Work
 from handeye.planning.collisions import Workspace
 from handeye.planning.constraints import ViewLimits
 from handeye.planning.policies import make_policy
@@ -64,6 +65,8 @@ class Configuration:
         Corners of the box that no motion may leave; None only for a simulated cell.
     collisions
         What links are judged by; once a session has begun it is no longer `auto`.
+    touch_mm, work
+        Touch error to reach in place of the accuracy, and what is seen and touched.
     start_rad
         Joints to start from, for an arm that is simulated; others start where they stand.
     """
@@ -88,6 +91,8 @@ class Configuration:
     limits: ViewLimits = field(default_factory=ViewLimits)
     patience: Patience = field(default_factory=Patience)
     simulation: Simulation = field(default_factory=Simulation)
+    touch_mm: float | None = None
+    work: Work = field(default_factory=Work)
 
     @property
     def is_simulated(self) -> bool:
@@ -117,6 +122,8 @@ class Configuration:
             joints_err=self.joints_err,
             refine=self.refine,
             policy=make_policy(self.policy),
+            touch_mm=self.touch_mm,
+            work=self.work,
         )
 
     def workspace(self) -> Workspace:

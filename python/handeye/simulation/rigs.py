@@ -24,14 +24,13 @@ from handeye.simulation.cells import (
     ErrorKind,
     calibration_covariance,
     camera_pose,
-    log_uniform,
-    mixed_flange,
+    draw_mixed,
     points_in_camera,
     postures_near,
-    random_twist,
     reported_poses,
     simulated_arm,
 )
+from handeye.simulation.mixed_arm import log_uniform, random_twist
 from handeye.types import (
     Body,
     Camera,
@@ -103,7 +102,7 @@ def simulate_rig(
     joints = _stations(random, arm, rig, options)
     if kind in MIXTURES:
         reported, read = arm.forward(joints), joints
-        flanges = mixed_flange(random, kind, arm, joints)
+        flanges = draw_mixed(random, kind, arm).stand(random, joints)
     else:
         reported, read = reported_poses(random, kind, arm, joints, options.cell)
         flanges = arm.forward(joints)

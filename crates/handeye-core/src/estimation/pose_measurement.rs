@@ -32,6 +32,26 @@ pub struct PoseMeasurement {
     pub degrees_of_freedom: f64,
     /// The slow part of the residual.
     pub slow: SlowResiduals,
+    /// Whether somebody else's detector measured it, whose error has levels of its own.
+    pub is_foreign: bool,
+}
+
+impl PoseMeasurement {
+    /// A pose without pixels, as somebody else's detector states it: `covariance` is that of its left perturbation.
+    pub fn stated(motion: Se3, pose: Se3, covariance: Matrix6<f64>) -> Self {
+        Self {
+            motion,
+            pose,
+            covariance,
+            sensitivity: Matrix6xX::zeros(0),
+            camera_information: DMatrix::zeros(0, 0),
+            camera_gradient: DVector::zeros(0),
+            variance_px2: 1.0,
+            degrees_of_freedom: 0.0,
+            slow: SlowResiduals::default(),
+            is_foreign: true,
+        }
+    }
 }
 
 /// Compresses a view at the pose that fits its image.
@@ -74,6 +94,7 @@ pub fn compress(
         variance_px2: block.squared_px / degrees_of_freedom.max(1.0),
         degrees_of_freedom,
         slow: slow_residuals(problem, k, camera, pose, parameters),
+        is_foreign: false,
     })
 }
 
