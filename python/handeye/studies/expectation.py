@@ -3,8 +3,8 @@
 A few cells like the one that is asked about are simulated up to `MEASURED` views. For more views the planner
 chooses candidates and says what covariance they leave, as it does for `handeye plan --together`: nothing is
 measured then, so fifty views cost hardly more than twelve. What is stated is on the safe side; by how much is
-read off the simulated cells, whose truth is known: the mean error that is foretold is the stated one times that
-ratio.
+read off the simulated cells, whose truth is known: the mean error that is foretold is the stated one times
+that ratio.
 """
 
 import tempfile
