@@ -27,7 +27,7 @@ LAYERS = [
     {"se3"},
     {"imaging", "batched_algebra", "positive"},
     {"simd"},
-    {"error"},
+    {"error", "interrupt"},
 ]
 # Rooms that tests may use and nothing else.
 FOR_TESTS = {"testing"}

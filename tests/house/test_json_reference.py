@@ -190,9 +190,11 @@ def test_demo_of_a_cell(handeye: Handeye, tmp_path: Path) -> None:
 
 def test_run(handeye: Handeye, tmp_path: Path) -> None:
     session = handeye.json("run", "--session", tmp_path / "cell", "--points-only", "0.1", "--seed", "5")
+    unknown = ("--uncalibrated", "--points-only", "0.1", "--max-views", "6")
+    learnt = handeye.json("run", "--session", tmp_path / "learnt", *unknown)
     # Its keys are those of solve.
-    session["calibration"] = None
-    compare("handeye run", session, handeye.json("run", "--dry-run"))
+    session["calibration"] = learnt["calibration"] = None
+    compare("handeye run", session, learnt, handeye.json("run", "--dry-run"))
 
 
 @pytest.mark.parametrize("study", ["table1", "curves", "holdout", "injected"])
@@ -215,6 +217,8 @@ def test_twin(handeye: Handeye) -> None:
 def test_simulated_studies(handeye: Handeye) -> None:
     data = handeye.json("study", "methods", "--trials", "1", "--workers", "1")
     compare("handeye study methods", data)
+    scale = handeye.json("study", "scale", "--trials", "40", "--workers", "1", "--no-cluster")
+    compare("handeye study scale", scale)
     few = ("--trials", "1", "--workers", "1")
     compare("handeye study policies", handeye.json("study", "policies", "--budgets", "5", *few))
     one_step = ("--candidates", "3", "--draws", "2", "--arm", "exact")

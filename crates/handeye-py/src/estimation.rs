@@ -1,5 +1,6 @@
 //! Pose measurements of a cell, and the posterior of everything in it.
 
+use crate::call::CallCore;
 use handeye_core::estimation::{
     Assumptions, Body, CameraPrior, Cell, Measurement, Options, PoseMeasurement, Posterior as CorePosterior,
     SeenBy, Station, WeakPrior, compress, estimate, shared_error, shrunk_variances, start_from_poses,
@@ -53,7 +54,7 @@ fn start_from_poses_py<'py>(
     let covariances = convert::matrices::<6, 6>(py, "covariances", &covariances)?;
     let start = given(py, start)?;
     let found = py
-        .detach(|| start_from_poses(&motions, &poses, &covariances, &weak_prior(prior_sigma_m), start))
+        .core(|| start_from_poses(&motions, &poses, &covariances, &weak_prior(prior_sigma_m), start))?
         .map_err(|e| to_python(py, e))?;
     Ok((
         convert::matrix_out(py, &found.x.to_matrix()),
@@ -93,7 +94,7 @@ impl PoseMeasurements {
         let columns = free.len() + usize::from(board_scale);
         let parameters = (columns > 0).then_some(PixelParameters { camera: free, board_scale });
         let views = py
-            .detach(|| {
+            .core(|| {
                 poses
                     .iter()
                     .enumerate()
@@ -101,7 +102,7 @@ impl PoseMeasurements {
                         compress(&problem.inner, k, problem.inner.camera(), pose, parameters.as_ref())
                     })
                     .collect::<Result<Vec<_>, _>>()
-            })
+            })?
             .map_err(|e| to_python(py, e))?;
         Ok(Self { views })
     }
@@ -260,11 +261,11 @@ fn estimate_cell<'py>(
         .transpose()?;
     let options = Options { assumptions, weak: WeakPrior::default(), pairs, most_rounds };
     let (inner, origin) = py
-        .detach(|| {
+        .core(|| {
             let given = given.as_ref().map(|(x, y)| (x.as_slice(), y.as_slice()));
             let start = start_of_cell(&cell, &options.weak, given)?;
             Ok((estimate(&cell, (start.x, start.y), &options)?, start.origin))
-        })
+        })?
         .map_err(|e| to_python(py, e))?;
     Ok(Posterior { inner, origin })
 }

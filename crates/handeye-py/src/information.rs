@@ -1,5 +1,6 @@
 //! Entropy, gains and predicted information of candidates.
 
+use crate::call::CallCore;
 use handeye_core::error::Error;
 use handeye_core::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, Task, ToolPoint, Trace,
@@ -217,11 +218,11 @@ impl Predictor {
             vector_unit.map_or_else(|| Ok(VectorUnit::widest()), |name| self::vector_unit(py, name))?;
         let matrices = convert::row_major::<4, 4>(py, "motions", motions)?;
         let matrices: &[f64] = &matrices;
-        let outcome = py.detach(|| {
+        let outcome = py.core(|| {
             let execution = Execution { unit, threads };
             let criterion = criterion.inner.as_ref();
             self.model().mean_gains(supposed, criterion, Motions::Matrices(matrices), &execution)
-        });
+        })?;
         match outcome {
             Ok(gains) => Ok(convert::scalars_out(py, gains)),
             Err(error @ Error::NotRigid { .. }) => {
@@ -314,7 +315,7 @@ impl Predictor {
             let joints = self.joints(py, arm, motions.len())?.unwrap_or_default();
             let criterion = criterion.inner.as_ref();
             let gains = py
-                .detach(|| self.model().gains_with_joints(&belief.inner, criterion, &motions, &joints))
+                .core(|| self.model().gains_with_joints(&belief.inner, criterion, &motions, &joints))?
                 .map_err(|e| to_python(py, e))?;
             return Ok(convert::scalars_out(py, gains));
         }
@@ -356,7 +357,7 @@ impl Predictor {
         let joints = self.joints(py, arm, motions.len())?;
         let model = self.model();
         let n = model.parameter_count();
-        let all: Vec<DMatrix<f64>> = py.detach(|| {
+        let all: Vec<DMatrix<f64>> = py.core(|| {
             motions
                 .iter()
                 .enumerate()
@@ -366,7 +367,7 @@ impl Predictor {
                         .map_or_else(|| DMatrix::zeros(n, n), |c| &c.factor * c.factor.transpose())
                 })
                 .collect()
-        });
+        })?;
         Ok(convert::dynamics_out(py, &all, n, n))
     }
 }

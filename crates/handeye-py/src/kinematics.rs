@@ -1,5 +1,6 @@
 //! Serial arms, batched.
 
+use crate::call::CallCore;
 use handeye_core::kinematics::{Chain as CoreChain, Frame, InverseOptions, Joint, JointKind};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -11,9 +12,6 @@ use crate::errors::{invalid, to_python};
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Chain>()
 }
-
-/// Poses between two looks at whether the user has interrupted: a pose out of reach takes about 8 ms.
-const SLICE: usize = 16;
 
 /// A serial arm.
 #[pyclass(frozen, module = "handeye._core")]
@@ -78,10 +76,10 @@ impl Chain {
     fn forward<'py>(&self, py: Python<'py>, joints: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let (count, values) = self.configurations(py, &joints)?;
         let poses = py
-            .detach(|| {
+            .core(|| {
                 let mut poses = vec![0.0; count * 16];
                 self.inner.forward_all(&values, &mut poses).map(|()| poses)
-            })
+            })?
             .map_err(|e| to_python(py, e))?;
         Ok(convert::array(py, &[count, 4, 4], poses))
     }
@@ -103,10 +101,10 @@ impl Chain {
         let (count, values) = self.configurations(py, &joints)?;
         let n = self.inner.len();
         let jacobians = py
-            .detach(|| {
+            .core(|| {
                 let mut jacobians = vec![0.0; count * 6 * n];
                 self.inner.jacobian_all(frame, &values, &mut jacobians).map(|()| jacobians)
-            })
+            })?
             .map_err(|e| to_python(py, e))?;
         Ok(convert::array(py, &[count, 6, n], jacobians))
     }
@@ -134,20 +132,17 @@ impl Chain {
         let mut joints = Vec::with_capacity(count * n);
         let mut reached = Vec::with_capacity(count);
         let mut off = Vec::with_capacity(count);
-        for (goals, starts) in goals.chunks(SLICE).zip(starts.chunks(SLICE * n)) {
-            py.detach(|| {
-                for (goal, start) in goals.iter().zip(starts.chunks_exact(n)) {
-                    let (q, found, how_far) = match self.inner.inverse(goal, start, &options) {
-                        Ok(reach) => (reach.joints, true, (0.0, 0.0)),
-                        Err(nearest) => (nearest.joints, false, (nearest.off_m, nearest.off_rad)),
-                    };
-                    joints.extend(q);
-                    reached.push(found);
-                    off.push(how_far);
-                }
-            });
-            py.check_signals()?;
-        }
+        py.core(|| {
+            for (goal, start) in goals.iter().zip(starts.chunks_exact(n)) {
+                let (q, found, how_far) = match self.inner.inverse(goal, start, &options) {
+                    Ok(reach) => (reach.joints, true, (0.0, 0.0)),
+                    Err(nearest) => (nearest.joints, false, (nearest.off_m, nearest.off_rad)),
+                };
+                joints.extend(q);
+                reached.push(found);
+                off.push(how_far);
+            }
+        })?;
         Ok((convert::array(py, &[count, n], joints), reached, off))
     }
 
@@ -164,7 +159,7 @@ impl Chain {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let goal = convert::transform(py, "goal", &goal)?;
         let options = InverseOptions { tolerance_m, tolerance_rad, steps, attempts };
-        let found = py.detach(|| self.inner.inverse_all(&goal, &options));
+        let found = py.core(|| self.inner.inverse_all(&goal, &options))?;
         Ok(convert::array(py, &[found.len(), self.inner.len()], found.concat()))
     }
 }

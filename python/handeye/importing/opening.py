@@ -178,6 +178,7 @@ def open_any(
         mounting=options.mounting,
         poses=options.poses,
         stated=options.stated,
+        arm=options.arm,
     )
     if isinstance(loaded, LoadedRecording):
         return _of_recording(loaded, options.camera)

@@ -10,6 +10,7 @@ use super::mixed::{Evaluation, Mixed, Wanted};
 use super::nodes;
 use super::weak_prior::WeakPrior;
 use crate::error::Error;
+use crate::interrupt;
 use crate::se3::Se3;
 
 /// How an estimate is made.
@@ -188,6 +189,7 @@ fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Error> {
     let mut at_rest = false;
     let mut steps = 0;
     while steps < MOST_STEPS && !at_rest {
+        interrupt::check();
         steps += 1;
         let mut taken = false;
         for _ in 0..8 {

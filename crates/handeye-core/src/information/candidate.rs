@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, Matrix4, Matrix6, Vector2};
 use super::belief::{Belief, CHAIN};
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
+use crate::interrupt;
 use crate::least_squares::{Moments, PixelColumns, PixelParameters, ViewBlock, marginalised};
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
@@ -206,6 +207,7 @@ impl CandidateModel<'_> {
 
     /// The candidate at robot motion `A`. Without `joints` its kinematic parameters, if there are any, move nothing.
     pub fn candidate(&self, motion: &Se3, joints: Option<&CandidateJoints>) -> Option<Candidate> {
+        interrupt::check();
         let (block, seen) = self.block(motion, joints)?;
         let extra = block.columns.as_ref().map_or(0, |c| c.gc.len());
         let n = self.parameter_count();

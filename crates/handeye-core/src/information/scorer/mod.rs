@@ -38,6 +38,7 @@ use super::criteria::{Gain, Quantity};
 use crate::batched_algebra::{UPPER, upper};
 use crate::camera::{Camera, Lens};
 use crate::error::Error;
+use crate::interrupt;
 use crate::least_squares::PixelParameters;
 use crate::se3::Se3;
 use crate::se3::entries;
@@ -136,6 +137,7 @@ impl<'a> Scorer<'a> {
         let mut padded = [0.0; BLOCK * MATRIX];
         let mut out = [0.0; BLOCK];
         for (i, gains) in gains.chunks_mut(BLOCK).enumerate() {
+            interrupt::check();
             let part = motions.part(i * BLOCK, gains.len());
             let matrices = match part {
                 Motions::Matrices(matrices) if gains.len() == BLOCK => matrices,
