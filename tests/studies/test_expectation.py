@@ -27,7 +27,7 @@ def test_the_mean_length_of_a_vector_is_that_of_its_distribution() -> None:
 def test_what_is_expected_is_about_what_other_cells_reach() -> None:
     found = expect(QUICK, [6], cells=4)
     errors = [reached((replace(QUICK, seed=seed), None))[6][0] for seed in range(4)]
-    assert 0.4 < found.at(6).mean_mm / float(np.mean(errors)) < 2.5
+    assert 0.3 < found.at(6).mean_mm / float(np.mean(errors)) < 3.5
     assert found.at(6).within_mm > found.at(6).mean_mm
 
 
