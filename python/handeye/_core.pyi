@@ -28,8 +28,8 @@ def nearest_rigid(T: ArrayLike) -> NDArray[float64]:
 
 # Cameras
 
-def lens_parameter_count(lens: str) -> int:
-    """Number of parameters of a lens, focal lengths and principal point included."""
+def lenses() -> list[tuple[str, list[str]]]:
+    """Every lens, and the names of its coefficients after `fx, fy, cx, cy`."""
 
 def project(
     lens: str, parameters: ArrayLike, points_camera: ArrayLike
@@ -324,7 +324,11 @@ class Belief:
     def hand_eye_entropy(self) -> float: ...
 
 class Criterion:
-    """What a view is worth: entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue or tool_point."""
+    """Worth of a view: entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue, tool_point or task.
+
+    `tasks` (P, d, n): rows over all parameters. A view is worth what it takes off the root mean square of the
+    tasks' summed variances.
+    """
 
     def __init__(
         self,
@@ -334,6 +338,7 @@ class Criterion:
         angle_scale_rad: float = 1e-3,
         tool_points: ArrayLike | None = None,
         over: str = "mean",
+        tasks: ArrayLike | None = None,
     ) -> None: ...
     @property
     def name(self) -> str: ...
@@ -381,6 +386,9 @@ class Predictor:
         `threads` (0: as many as pay off) and `vector_unit` change nothing beyond rounding.
         """
 
+    def in_sight(self, motions: ArrayLike) -> list[bool]:
+        """Which candidates (N, 4, 4) would show enough of the target."""
+
     def informations(
         self, motions: ArrayLike, *, arm: tuple[ArrayLike, ArrayLike] | None = None
     ) -> NDArray[float64]:
@@ -408,7 +416,16 @@ class PoseMeasurements:
         *,
         free_camera: list[int] | None = None,
         board_scale: bool = False,
-    ) -> None: ...
+        sigmas_px: Sequence[ArrayLike | None] | None = None,
+    ) -> None:
+        """`sigmas_px`: deviations of the points of each view, which tell better points from worse."""
+    @staticmethod
+    def stated(motions: ArrayLike, poses: ArrayLike, covariances: ArrayLike) -> PoseMeasurements:
+        """Poses (K, 4, 4) that somebody else's detector states.
+
+        With the covariance (K, 6, 6) of their left perturbation, and the middle (K, 4, 4) of each chain.
+        """
+
     def __len__(self) -> int: ...
     @property
     def variances_px2(self) -> list[float]: ...
@@ -439,6 +456,8 @@ class Posterior:
     def level_names(self) -> list[str]: ...
     @property
     def levels(self) -> list[list[float]]: ...
+    @property
+    def weights(self) -> list[float]: ...
     @property
     def degrees_of_freedom(self) -> list[float]: ...
     def degrees_of_freedom_of(self, combinations: ArrayLike) -> list[float]:
@@ -503,6 +522,15 @@ class Chain:
         """Twists (N, 6, n) per joint.
 
         `T(q + dq) = exp(J dq) T(q)` for "base", `T(q) exp(J dq)` for "flange".
+        """
+
+    def displacements(
+        self, joints: ArrayLike, frame: str, which: list[int], twists: ArrayLike
+    ) -> NDArray[float64]:
+        """Twists (N, 6, m) of the flange per way of displacing a joint on the link before it.
+
+        `which` joint each way displaces, and its twist (m, 6) in the joint's frame before it moves; frames as
+        of `jacobians`.
         """
 
     def inverse(

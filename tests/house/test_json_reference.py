@@ -14,10 +14,12 @@ from bags_written import Journey, write
 from commands import Handeye
 from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
+from handeye.datasets import write_rig
 from handeye.datasets.shipped import shipped_recording
 from handeye.datasets.toml_text import toml_text
 from handeye.simulation import example_folder
 from handeye.simulation.cells import CellOptions, ErrorKind, simulate
+from handeye.simulation.rigs import simulate_rig
 from handeye.types import Charuco, Mounting
 from scenes import scene
 
@@ -99,11 +101,29 @@ def test_solve(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     )
 
 
+def test_solve_several_cameras(handeye: Handeye, tmp_path: Path) -> None:
+    write_rig(simulate_rig(ErrorKind.MIXTURE_CELL, 1), tmp_path / "rig")
+    data = handeye.json("solve", tmp_path / "rig", "--robot", "ur5e")
+    one = documented("handeye solve")
+    for camera in data["cameras"].values():
+        target = camera.pop("target")
+        unknown = [key for key in keys(camera) if not any(matches(row, key) for row in one)]
+        assert {key for key in unknown if not key.startswith(("T_base_camera", "T_flange_target"))} <= {
+            key for key in unknown if "evidence" in key
+        }
+        camera.clear()
+        camera["target"] = target
+    compare("handeye solve, several cameras", data)
+
+
 def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
     path = tmp_path / "demo.samples"
     path.write_text(easy_samples(Mounting.EYE_IN_HAND))
     answer = handeye.json("solve", path, "--mounting", "eye_in_hand")
-    compare("handeye solve, poses alone", answer)
+    # One sample says what another has seen.
+    path.write_text(easy_samples(Mounting.EYE_IN_HAND, wrong=1))
+    one_out = handeye.json("solve", path, "--mounting", "eye_in_hand")
+    compare("handeye solve, poses alone", answer, one_out)
 
 
 def test_demo_of_a_folder(handeye: Handeye, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -174,9 +194,11 @@ def test_demo_of_a_cell(handeye: Handeye, tmp_path: Path) -> None:
 
 def test_run(handeye: Handeye, tmp_path: Path) -> None:
     session = handeye.json("run", "--session", tmp_path / "cell", "--points-only", "0.1", "--seed", "5")
+    unknown = ("--uncalibrated", "--points-only", "0.1", "--max-views", "6")
+    learnt = handeye.json("run", "--session", tmp_path / "learnt", *unknown)
     # Its keys are those of solve.
-    session["calibration"] = None
-    compare("handeye run", session, handeye.json("run", "--dry-run"))
+    session["calibration"] = learnt["calibration"] = None
+    compare("handeye run", session, learnt, handeye.json("run", "--dry-run"))
 
 
 @pytest.mark.parametrize("study", ["table1", "curves", "holdout", "injected"])
@@ -199,12 +221,19 @@ def test_twin(handeye: Handeye) -> None:
 def test_simulated_studies(handeye: Handeye) -> None:
     data = handeye.json("study", "methods", "--trials", "1", "--workers", "1")
     compare("handeye study methods", data)
+    scale = handeye.json("study", "scale", "--trials", "40", "--workers", "1", "--no-cluster")
+    compare("handeye study scale", scale)
     few = ("--trials", "1", "--workers", "1")
     compare("handeye study policies", handeye.json("study", "policies", "--budgets", "5", *few))
     one_step = ("--candidates", "3", "--draws", "2", "--arm", "exact")
     compare("handeye study gains", handeye.json("study", "gains", *one_step, *few))
     data = handeye.json("study", "coverage", "--trials", "1", "--workers", "1")
     compare("handeye study coverage", data)
+
+
+def test_touch(handeye: Handeye) -> None:
+    options = ("--cells", "1", "--touches", "3", "--workers", "1")
+    compare("handeye study touch", handeye.json("study", "touch", *options))
 
 
 def test_bench(handeye: Handeye) -> None:

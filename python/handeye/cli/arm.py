@@ -1,5 +1,6 @@
 """The options that name the arm, for every command that can make use of its kinematics."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -7,7 +8,7 @@ from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError
 from handeye.robots import Arm, ArmKinematics, arm_kinematics, open_arm
-from handeye.types import Recording
+from handeye.types import View
 from handeye.types.calibration import ModelName
 
 
@@ -40,8 +41,8 @@ class ArmSource:
             return None
         return open_arm(self.robot, base=self.robot_base, tip=self.robot_tip)
 
-    def kinematics(self, recording: Recording, model: ModelName) -> ArmKinematics | None:
-        """Return the kinematics of the arm in the frames of the recording's poses, None if no arm is named.
+    def kinematics(self, views: Sequence[View], model: ModelName) -> ArmKinematics | None:
+        """Return the kinematics of the arm in the frames of the views' poses, None if no arm is named.
 
         Raises
         ------
@@ -56,4 +57,4 @@ class ArmSource:
                 hint="leave --robot or --model paper away",
             )
         arm = self.described()
-        return None if arm is None else arm_kinematics(arm, recording.views)
+        return None if arm is None else arm_kinematics(arm, views)

@@ -18,16 +18,21 @@ from handeye.cli.output import check_output, write_json
 from handeye.cli.page import Page, serve, show_views
 from handeye.cli.plan_together import Together, check_together, choose_together, show_together, together_data
 from handeye.cli.source import Source, mindful_of
+from handeye.cli.work import WorkOptions, check_touch, touch_lines
 from handeye.datasets import read_poses
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Measurements, make_estimator
+from handeye.estimation.estimate import answering
 from handeye.estimation.initialize import check_views
+from handeye.estimation.work import Work, touch_where_possible
 from handeye.importing import Opened
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
 from handeye.planning.prediction import Sight
+from handeye.planning.touch import touch_criterion
 from handeye.robots import ArmKinematics
 from handeye.session.deciding import Considered
 from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.touch import TouchMap
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -46,6 +51,7 @@ class Criterion(StrEnum):
     EIGENVALUE_SUM = "eigenvalue_sum"
     MIN_EIGENVALUE = "min_eigenvalue"
     TOOL_POINT = "tool_point"
+    TOUCH = "touch"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +63,8 @@ class _Plan:
     used: tuple[str, ...]
     warnings: tuple[str, ...]
     estimate: Estimate
+    touch: TouchMap | None
+    touch_mm: float | None
     ranking: Ranking
     batch: Together | None
 
@@ -68,8 +76,9 @@ def plan(
     used: Annotated[tuple[str, ...] | None, Parameter(consume_multiple=True)] = None,
     first: int | None = None,
     candidates: Path | None = None,
-    criterion: Criterion = Criterion.ENTROPY,
+    criterion: Criterion | None = None,
     tool_point_mm: tuple[float, float, float] | None = None,
+    touch_mm: float | None = None,
     model: ModelName = ModelName.AUTO,
     top: int | None = None,
     together: int | None = None,
@@ -79,6 +88,7 @@ def plan(
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
+    work: WorkOptions = WorkOptions(),  # noqa: B008 - frozen
     page: Page = Page(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
@@ -102,9 +112,12 @@ def plan(
     criterion
         What a view is worth. entropy: all that is learnt (the paper's). entropy_handeye: of the hand-eye
         alone. trace, eigenvalue_sum, min_eigenvalue: a millimetre weighs like a milliradian. tool_point: the
-        deviation of one point.
+        deviation of one point. touch: how far off the tool lands where it works. Without it touch if
+        --touch-mm is given, entropy otherwise.
     tool_point_mm
         That point, in the camera frame: x y z.
+    touch_mm
+        Say whether a touch lands within so much with 95 % probability already, wherever in the box of work.
     model
         auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
     top
@@ -123,10 +136,14 @@ def plan(
     """
     check_output(output)
     _check(used, first, top)
-    check_together(together, criterion)
     if not 0 < speed_deg_s < float("inf"):
         raise UsageError(f"--speed-deg-s {speed_deg_s}, expected above zero")
-    worth = _criterion(criterion, tool_point_mm)
+    check_touch(touch_mm)
+    if criterion is None:
+        criterion = Criterion.ENTROPY if touch_mm is None else Criterion.TOUCH
+    check_together(together, criterion)
+    if (criterion is Criterion.TOOL_POINT) != (tool_point_mm is not None):
+        raise UsageError("--criterion tool_point and --tool-point-mm go together")
     table = None if candidates is None else read_poses(candidates, source.stated())
     opened = (source if table is None else source.of_a_recording(folder)).open(folder, arm.described())
     measurements = Measurements.of_recording(opened.recording)
@@ -140,13 +157,16 @@ def plan(
         pool = Pool(tuple(Candidate(name, pose) for name, pose in named))
         sight = Sight(margin_px=margin_px, fewest=fewest)
     names = [view.name for view in measurements.views]
-    options = PlannerOptions(criterion=worth, sight=sight)
     warnings = (*opened.warnings, *(() if table is None else table.warnings))
     with mindful_of(warnings):
         start = measurements.select([names.index(name) for name in taken])
-        kinematics = arm.kinematics(opened.recording, model)
-        estimator = make_estimator(model, kinematics)
-        planner = Planner(start, pool, estimator, options)
+        kinematics = arm.kinematics(opened.recording.views, model)
+        estimate = make_estimator(model, kinematics)(start)
+        here = work.work()
+        known = touch_where_possible(estimate, start, here)
+        worth = _criterion(criterion, tool_point_mm, estimate, start, here)
+        options = PlannerOptions(criterion=worth, sight=sight)
+        planner = Planner(start, pool, answering(estimate), options)
         ranking = rank(planner.estimate, planner.pool, worth, sight, gains=planner.gains(), top=top)
         batch = None
         if together is not None:
@@ -166,10 +186,12 @@ def plan(
     ranking = replace(ranking, infeasible=ranking.infeasible | again)
     found = _Plan(
         opened.recording.name,
-        worth.name,
+        criterion.value if estimate.determined else worth.name,
         taken,
         tuple(str(warning) for warning in warnings),
         planner.estimate,
+        known,
+        touch_mm,
         ranking,
         batch,
     )
@@ -215,9 +237,18 @@ def _names(pool: Pool) -> set[str]:
     return {candidate.name for candidate in pool.candidates}
 
 
-def _criterion(name: Criterion, tool_point_mm: tuple[float, float, float] | None) -> _core.Criterion:
-    if (name is Criterion.TOOL_POINT) != (tool_point_mm is not None):
-        raise UsageError("--criterion tool_point and --tool-point-mm go together")
+def _criterion(
+    name: Criterion,
+    tool_point_mm: tuple[float, float, float] | None,
+    estimate: Estimate,
+    measurements: Measurements,
+    work: Work,
+) -> _core.Criterion:
+    if name is Criterion.TOUCH:
+        # Views that leave something open are to be cured first.
+        if not estimate.determined:
+            return _core.Criterion(Criterion.ENTROPY.value)
+        return touch_criterion(estimate, measurements, work)
     if tool_point_mm is None:
         return _core.Criterion(name.value)
     return _core.Criterion(name.value, tool_points=np.array([tool_point_mm]) / MM_PER_M)
@@ -275,6 +306,11 @@ def _data(found: _Plan) -> dict[str, Any]:
         "sigma_translation_mm": MM_PER_M * float(np.sqrt(np.trace(covariance[:3, :3]))),
         "sigma_rotation_deg": float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:])))),
         "determined": estimate.determined,
+        "touch": None if found.touch is None else found.touch.to_dict(),
+        "touch_mm": found.touch_mm,
+        "touch_met": found.touch_mm is not None
+        and found.touch is not None
+        and found.touch.worst_m * MM_PER_M <= found.touch_mm,
         "unobservable": [direction.to_dict() for direction in estimate.unobservable],
         "feasible_count": found.ranking.feasible_count,
         "ranking": [_prospect(number, p) for number, p in enumerate(found.ranking.prospects, start=1)],
@@ -299,7 +335,15 @@ def _show(console: "Console", found: _Plan, shown: int) -> None:
     from rich import box  # noqa: PLC0415 - a program reading JSON need not wait for it
     from rich.table import Table  # noqa: PLC0415
 
-    from handeye.cli.wording import MOUNTINGS, both, figures, heading, notices, open_directions  # noqa: PLC0415
+    from handeye.cli.wording import (  # noqa: PLC0415
+        MOUNTINGS,
+        both,
+        figures,
+        heading,
+        notices,
+        open_directions,
+        pairs,
+    )
 
     data, estimate, ranking = _data(found), found.estimate, found.ranking
     heading(
@@ -310,6 +354,11 @@ def _show(console: "Console", found: _Plan, shown: int) -> None:
     )
     now = both(data["sigma_translation_mm"] / MM_PER_M, np.deg2rad(data["sigma_rotation_deg"]))
     known = f"{now} (one standard deviation)" if estimate.determined else "not determined yet, see below"
+    if found.touch is not None:
+        pairs(console, touch_lines(found.touch))
+    if found.touch_mm is not None:
+        met = "is reached" if data["touch_met"] else "is not reached yet"
+        console.print(f"The touch error asked for, {found.touch_mm:g} mm wherever in the box, {met}.")
     console.print(f"Now: {known}. Predicted after one more view:\n")
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("rank", justify="right")

@@ -8,18 +8,21 @@ import numpy as np
 
 from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
+from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.page import Page, serve, show_views
 from handeye.cli.solve_poses import answer_for_poses
+from handeye.cli.solve_rig import answer_for_rig
 from handeye.cli.source import Source, mindful_of
+from handeye.cli.work import WorkOptions, touch_lines
 from handeye.datasets import PosePairs
 from handeye.estimation import Measurements, make_estimator
 from handeye.estimation import solve as solve_recording
 from handeye.estimation.certificate import Certificate, certify_calibration
 from handeye.estimation.confidence import Ellipsoid, position_region, within
 from handeye.estimation.mistakes import examine
-from handeye.importing import Opened
+from handeye.importing import Opened, is_rig
 from handeye.robots import ArmKinematics
 from handeye.types.calibration import Calibration, JointOffset, ModelName, RobotSide
 
@@ -38,6 +41,7 @@ def solve(
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
+    work: WorkOptions = WorkOptions(),  # noqa: B008 - frozen
     page: Page = Page(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
@@ -51,7 +55,8 @@ def solve(
     Parameters
     ----------
     folder
-        Folder with the views, or a file of samples of easy_handeye2 or MoveIt.
+        Folder with the views or with a folder for each camera, or a file of samples of easy_handeye2 or
+        MoveIt.
     model
         auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
     reduced
@@ -64,13 +69,31 @@ def solve(
         Also write the JSON object to this file.
     """
     check_output(output)
+    if is_rig(folder):
+        if certify or page.ui:
+            raise UsageError("--certify and --ui take one camera", hint="leave them out for several")
+        rig = source.open_rig(folder)
+        views = [station.views[0].view for station in rig.recording.stations]
+        return answer_for_rig(
+            rig,
+            model,
+            output,
+            reduced=reduced,
+            kinematics=arm.kinematics(views, model),
+            camera_fixed=camera_fixed,
+        )
     opened = source.open_any(folder, arm.described())
     if isinstance(opened, PosePairs):
         return answer_for_poses(opened, output)
     with mindful_of(opened.warnings):
-        kinematics = arm.kinematics(opened.recording, model)
+        kinematics = arm.kinematics(opened.recording.views, model)
         calibration = solve_recording(
-            opened.recording, model, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed
+            opened.recording,
+            model,
+            reduced=reduced,
+            kinematics=kinematics,
+            camera_fixed=camera_fixed,
+            work=work.work(),
         )
     region = position_region(calibration)
     data = _data(opened, calibration, region)
@@ -166,6 +189,7 @@ def _show(
             ("accuracy", f"{stated} with 95 % probability (centre of the camera, rotation)"),
             ("standard deviation", f"{accuracy} of position and rotation"),
             ("95 % ellipsoid", f"of the position, semi-axes {axes} mm"),
+            *(() if calibration.touch is None else touch_lines(calibration.touch)),
             ("residuals", residuals),
             ("noise", _noise(calibration)),
             *((f"joint {offset.joint}", _offset(offset)) for offset in calibration.joint_offsets),

@@ -10,10 +10,10 @@ from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
-from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, read_target
+from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, read_cameras, read_target
 from handeye.datasets.recording_header import FILE_NAME
 from handeye.errors import HandeyeError
-from handeye.importing import BagOptions, Opened, SourceOptions, open_any, open_folder
+from handeye.importing import BagOptions, Opened, OpenedRig, SourceOptions, open_any, open_folder, open_rig
 from handeye.notations import Direction, Unit, notation_of
 from handeye.robots import Arm
 from handeye.types import Chessboard, Mounting, Target
@@ -143,6 +143,19 @@ class Source(Board):
         options = self.options(arm)
         with progress("Looking for the target in the images") as advance:
             return open_any(folder, options, progress=advance)
+
+    def open_rig(self, folder: Path) -> OpenedRig:
+        """Read a folder with several cameras; `--camera` may be a chain of Kalibr.
+
+        Raises
+        ------
+        UsageError, InputError, DetectionError
+            As `options` and `handeye.importing.open_rig`.
+        """
+        options = replace(self, camera=None).options()
+        cameras = None if self.camera is None else read_cameras(self.camera)
+        with progress("Looking for the target in the images") as advance:
+            return open_rig(folder, options, cameras=cameras, progress=advance)
 
     def open(self, folder: Path, arm: Arm | None = None) -> Opened:
         """Read a folder, with progress where the target has to be found in images first.

@@ -31,7 +31,18 @@ study = App(
 )
 # Imported when it runs.
 study.command(
+    "handeye.cli.study_touch:touch", name="touch", help="Count how often the tool lands where it is said to."
+)
+study.command(
     "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
+)
+study.command(
+    "handeye.cli.study_public:public", name="public", help="Compare on cells and data that others made."
+)
+study.command(
+    "handeye.cli.study_scale:scale",
+    name="scale",
+    help="Measure what a million trials cost here and on a cluster.",
 )
 study.command(
     "handeye.cli.study_methods:methods",

@@ -4,16 +4,16 @@ An importer gives an `ImageSet`, images and poses in which the points are still 
 a `Recording`, ready to be solved.
 """
 
-from handeye.datasets.camera_files import read_camera
+from handeye.datasets.camera_files import read_camera, read_cameras
 from handeye.datasets.image_set import ImageSet, ImportOptions, Shot, UnreadPoses
-from handeye.datasets.importer import Importer
+from handeye.datasets.importer import Imported, Importer
 from handeye.datasets.loading import IMPORTERS, load
 from handeye.datasets.parameter_files import read_target
 from handeye.datasets.plausibility import DataWarning, recording_warnings
 from handeye.datasets.pose_files import PoseTable, read_pose_rows, read_poses
 from handeye.datasets.pose_pairs import PosePair, PosePairs
 from handeye.datasets.pose_rows import PoseRows, Reading, Statement
-from handeye.datasets.read_back import check_written
+from handeye.datasets.read_back import check_written, check_written_rig
 from handeye.datasets.recording_format import LoadedRecording, read_recording, write_recording
 from handeye.datasets.recording_header import holds_several
 from handeye.datasets.rig_format import LoadedRig, read_rig, rig_warnings, write_rig
@@ -23,6 +23,7 @@ __all__ = [
     "DataWarning",
     "ImageSet",
     "ImportOptions",
+    "Imported",
     "Importer",
     "LoadedRecording",
     "LoadedRig",
@@ -35,9 +36,11 @@ __all__ = [
     "Statement",
     "UnreadPoses",
     "check_written",
+    "check_written_rig",
     "holds_several",
     "load",
     "read_camera",
+    "read_cameras",
     "read_pose_rows",
     "read_poses",
     "read_recording",

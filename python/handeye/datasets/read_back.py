@@ -3,8 +3,9 @@
 import os
 
 from handeye.datasets.recording_format import read_recording
+from handeye.datasets.rig_format import read_rig
 from handeye.errors import InputError, OutputError
-from handeye.types import Recording
+from handeye.types import Recording, RigRecording
 
 
 def check_written(recording: Recording, folder: str | os.PathLike[str]) -> None:
@@ -27,3 +28,32 @@ def _comparable(recording: Recording) -> tuple[object, ...]:
     views = [{**view.to_dict(), "image": None} for view in recording.views]
     r = recording
     return r.name, r.mounting, r.camera, r.target, r.truth, r.source, views
+
+
+def check_written_rig(recording: RigRecording, folder: str | os.PathLike[str]) -> None:
+    """Read a recording of several cameras back, and compare it; of one camera and one target as that.
+
+    Raises
+    ------
+    OutputError
+        As for `check_written`.
+    """
+    if recording.single is not None:
+        check_written(recording.single, folder)
+        return
+    try:
+        back = read_rig(folder).recording
+    except InputError as error:
+        raise OutputError(f"{folder}: does not read back: {error.message}", code="not_exact") from error
+    if _comparable_rig(back) != _comparable_rig(recording):
+        raise OutputError(f"{folder}: does not read back as it was written", code="not_exact")
+
+
+def _comparable_rig(recording: RigRecording) -> tuple[object, ...]:
+    views = [
+        (one.camera, one.target, {**one.view.to_dict(), "image": None})
+        for station in recording.stations
+        for one in station.views
+    ]
+    r = recording
+    return r.name, dict(r.cameras), dict(r.targets), r.truth, r.source, views

@@ -91,10 +91,13 @@ class ArmModel:
         self, mounting: Mounting, joints: FloatArray, joint_rad: float
     ) -> tuple[FloatArray, FloatArray]:
         """What the arm does to A on its left at joints (N, n): noise roots (N, 6, n), constants (N, 6, k)."""
-        by_joint = self.kinematics.motion_jacobians(mounting, joints)
-        by_link = self.kinematics.link_jacobians(mounting, joints)[:, :, list(self.order)]
-        scaled = by_joint * self.scales
-        return scaled * joint_rad, np.concatenate([scaled[:, :, list(self.free)], by_link], axis=2)
+        scaled = self.kinematics.motion_jacobians(mounting, joints) * self.scales
+        by_link = self.kinematics.link_jacobians(mounting, joints)
+        count = len(self.free)
+        constants = np.empty((len(joints), 6, self.constants))
+        constants[:, :, :count] = scaled[:, :, list(self.free)]
+        constants[:, :, count:] = by_link[:, :, list(self.order)]
+        return scaled * joint_rad, constants
 
     @property
     def constants(self) -> int:
@@ -108,6 +111,12 @@ class ArmModel:
         displacements = np.zeros(len(self.lengths))
         displacements[list(self.order)] = constants[len(self.free) :]
         return ArmCorrection(offsets, displacements)
+
+    def parameters(self, correction: ArmCorrection) -> FloatArray:
+        """(k,) what was found of joints and links in the order of the parameters; undoes `correction`."""
+        free = list(self.free)
+        offsets = correction.joint_offsets[free] / self.scales[free]
+        return np.concatenate([offsets, correction.displacements[list(self.order)]])
 
     def offsets(self, constants: FloatArray, covariance: FloatArray) -> tuple[JointOffset, ...]:
         """Name the offsets, of the constants (k,) and their covariance (k, k)."""

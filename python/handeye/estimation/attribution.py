@@ -4,6 +4,7 @@ Nothing is estimated again. How much each component moves the measurements, in s
 pixels, and by how much the likelihood falls without it come with the posterior.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,6 +47,24 @@ class Levels:
     def of(cls, posterior: _core.Posterior) -> "Levels":
         """Read the levels at the mode."""
         return cls(dict(zip(posterior.level_names, posterior.levels[0], strict=True)))
+
+    @classmethod
+    def expected_noise(cls, posterior: _core.Posterior) -> StationNoise:
+        """What is new at every station, root mean square over what the levels may be."""
+        nodes = [
+            cls(dict(zip(posterior.level_names, levels, strict=True))).station_noise()
+            for levels in posterior.levels
+        ]
+        weights = np.array(posterior.weights)
+
+        def mean(of: Callable[[StationNoise], float]) -> float:
+            return float(np.sqrt(weights @ np.square([of(node) for node in nodes])))
+
+        return StationNoise(
+            (mean(lambda n: n.flange[0]), mean(lambda n: n.flange[1])),
+            (mean(lambda n: n.base[0]), mean(lambda n: n.base[1])),
+            mean(lambda n: n.joint_rad),
+        )
 
     def twist(self, name: str) -> tuple[float, float]:
         """Translation (metres) and rotation (radians) of a component that is a twist."""

@@ -125,6 +125,7 @@ def estimate_of(
         iterations=rounds,
         candidate_sigma_px=pixels.shared * float(np.median(pixels.sigma_px)),
         station_noise=levels.station_noise(),
+        expected_noise=Levels.expected_noise(posterior),
         free_camera=prior.free,
         board_scale=float(fit.theta[board]),
         unobservable=unobservable,

@@ -11,6 +11,7 @@ from handeye.estimation.initialize import check_views
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.mistakes import Examination, examine
 from handeye.estimation.paper import paper_estimate
+from handeye.estimation.work import Work, touch_where_possible
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName, ViewResult
 from handeye.types.kinematics import Kinematics
@@ -40,6 +41,7 @@ def solve(
     reduced: bool = False,
     kinematics: Kinematics | None = None,
     camera_fixed: bool = False,
+    work: Work | None = None,
 ) -> Calibration:
     """Calibrate from all usable views of a recording.
 
@@ -59,6 +61,9 @@ def solve(
         positions.
     camera_fixed
         Whether the camera is held as it is given; the paper's model always holds it.
+    work
+        What is seen and touched, for the touch error; None for none. `Work()` is a usual tool where the board
+        was seen.
 
     Raises
     ------
@@ -74,7 +79,12 @@ def solve(
     """
     measurements = Measurements.of_recording(recording)
     return calibrate(
-        measurements, ModelName(model), reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed
+        measurements,
+        ModelName(model),
+        reduced=reduced,
+        kinematics=kinematics,
+        camera_fixed=camera_fixed,
+        work=work,
     )
 
 
@@ -85,11 +95,17 @@ def calibrate(
     reduced: bool = False,
     kinematics: Kinematics | None = None,
     camera_fixed: bool = False,
+    work: Work | None = None,
 ) -> Calibration:
     """Calibrate from measurements; see `solve`."""
     check_views(measurements)
     return calibrate_examined(
-        examine(measurements), model, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed
+        examine(measurements),
+        model,
+        reduced=reduced,
+        kinematics=kinematics,
+        camera_fixed=camera_fixed,
+        work=work,
     )
 
 
@@ -100,6 +116,7 @@ def calibrate_examined(
     reduced: bool = False,
     kinematics: Kinematics | None = None,
     camera_fixed: bool = False,
+    work: Work | None = None,
 ) -> Calibration:
     """Calibrate from measurements whose mistakes have been looked for; see `solve`."""
     measurements = examination.measurements
@@ -108,6 +125,8 @@ def calibrate_examined(
     if not reduced:
         require_determined(estimate)
     calibration = examination.told(to_calibration(measurements, estimate))
+    if work is not None:
+        calibration = replace(calibration, touch=touch_where_possible(estimate, measurements, work))
     if calibration.model is ModelName.PAPER or not estimate.determined:
         return calibration
     if estimate.attribution is None:

@@ -72,6 +72,8 @@ class Estimate:
         described come again in every view, and no view lessens them: they are in the covariance only.
     station_noise
         What is new in the robot's error at every station, at the likeliest noise.
+    expected_noise
+        The same, root mean square over what the noise may be: what the robot adds when it works.
     noise
         The noise levels behind the answer, for people.
     free_camera
@@ -104,6 +106,7 @@ class Estimate:
     iterations: int
     candidate_sigma_px: float
     station_noise: StationNoise = field(default_factory=StationNoise)
+    expected_noise: StationNoise = field(default_factory=StationNoise)
     free_camera: tuple[int, ...] = ()
     board_scale: float | None = None
     unobservable: tuple[Unobservable, ...] = ()
@@ -148,6 +151,12 @@ class Estimate:
         """Return measurements with robot poses as the arm stands by what is known of it; see `corrected`."""
         return corrected(measurements, self.kinematics, self.arm_correction)
 
+    def poses_as_built(self, T_base_flange: FloatArray, joints: FloatArray) -> FloatArray:
+        """(K, 4, 4) where the flange stands when it reports (K, 4, 4) at joints (K, n); see the function."""
+        if self.kinematics is None or self.arm_correction is None:
+            return T_base_flange
+        return poses_as_built(self.kinematics, self.arm_correction, T_base_flange, joints)
+
 
 def _entropy(covariance: FloatArray) -> float:
     sign, log_determinant = np.linalg.slogdet(covariance)
@@ -165,14 +174,21 @@ def corrected(
     """
     if kinematics is None or correction is None or any(v.joints_rad is None for v in measurements.views):
         return measurements
-    mounting, joints = measurements.mounting, measurements.joints
-    twists = kinematics.motion_jacobians(mounting, joints) @ correction.joint_offsets
-    twists += kinematics.link_jacobians(mounting, joints) @ correction.displacements
-    motions = _core.se3_exp(twists) @ measurements.motions
-    # What leads from a robot pose to A leads back.
-    poses = [mounting.chain(Pose(motion)) for motion in motions]
+    reported = np.array([view.T_base_flange.matrix for view in measurements.views]).reshape(-1, 4, 4)
+    built = poses_as_built(kinematics, correction, reported, measurements.joints)
+    poses = [Pose(pose) for pose in built]
     views = zip(measurements.views, poses, strict=True)
     return replace(measurements, views=tuple(replace(view, T_base_flange=pose) for view, pose in views))
+
+
+def poses_as_built(
+    kinematics: Kinematics, correction: ArmCorrection, T_base_flange: FloatArray, joints: FloatArray
+) -> FloatArray:
+    """(K, 4, 4) where the flange stands when it reports (K, 4, 4) at joints (K, n), by what was found."""
+    to_hand = Mounting.EYE_TO_HAND
+    twists = kinematics.motion_jacobians(to_hand, joints) @ correction.joint_offsets
+    twists += kinematics.link_jacobians(to_hand, joints) @ correction.displacements
+    return _core.se3_exp(twists) @ T_base_flange
 
 
 def side_of_chain(mounting: Mounting, side: RobotSide) -> str | None:
@@ -192,6 +208,16 @@ class Estimator(Protocol):
     def __call__(self, measurements: Measurements, previous: Estimate | None = None) -> Estimate:
         """Estimate from these measurements."""
         ...
+
+
+def answering(estimate: Estimate) -> Estimator:
+    """Return what answers with an estimate that is there already."""
+
+    def answer(measurements: Measurements, previous: Estimate | None = None) -> Estimate:
+        del measurements, previous
+        return estimate
+
+    return answer
 
 
 def regular_information(covariance: FloatArray) -> FloatArray:

@@ -5,16 +5,20 @@ from handeye.importing.bags import Timing
 from handeye.importing.lag import Lag
 from handeye.importing.opening import CameraOrigin, Opened, SourceOptions, open_any, open_folder
 from handeye.importing.poses_alone import PosesSolved, solve_poses
+from handeye.importing.rigs import OpenedRig, is_rig, open_rig
 
 __all__ = [
     "BagOptions",
     "CameraOrigin",
     "Lag",
     "Opened",
+    "OpenedRig",
     "PosesSolved",
     "SourceOptions",
     "Timing",
+    "is_rig",
     "open_any",
     "open_folder",
+    "open_rig",
     "solve_poses",
 ]

@@ -169,7 +169,7 @@ class Planner:
     def ask(self) -> Proposal | Stop:
         """Propose the next view, or say why there is none to take."""
         gains = self.gains()
-        state = State(len(self._measurements), self._estimate, gains)
+        state = State(self._measurements, self._estimate, gains)
         stop = first_verdict(self._options.stop_rules, state)
         if stop is not None:
             return stop

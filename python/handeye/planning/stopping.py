@@ -11,6 +11,7 @@ import numpy as np
 from handeye.errors import InputError
 from handeye.estimation.accuracy import tool_deviations_m
 from handeye.estimation.estimate import Estimate
+from handeye.estimation.measurements import Measurements
 from handeye.types.arrays import FloatArray
 
 
@@ -34,11 +35,16 @@ class Stop:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What a stop rule may look at: views taken, what is believed, gains (N,) of the candidates left."""
+    """What a stop rule may look at: measurements, what is believed, gains (N,) of the candidates left."""
 
-    views: int
+    measurements: Measurements
     estimate: Estimate
     gains: FloatArray
+
+    @property
+    def views(self) -> int:
+        """Number of views taken."""
+        return len(self.measurements)
 
     @property
     def best_gain(self) -> float | None:

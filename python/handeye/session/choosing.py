@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from handeye.estimation import Estimate
+from handeye.estimation.estimate import answering
 from handeye.planning import Planner, PlannerOptions, Stop, StopReason
 from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import ViewLimits
@@ -24,7 +25,6 @@ from handeye.session.deciding import (
     Situation,
     Step,
     decision_of,
-    estimator_of,
     halt_of,
 )
 from handeye.session.entry import TRANSIENT, Entry, Failure
@@ -155,6 +155,7 @@ class ArmChooser:
         drawn = self._generator.draw(estimate, postures, random, shunned=shunned)
         options = PlannerOptions(
             policy=self._wish.policy,
+            criterion=self._wish.criterion(estimate, situation.measurements),
             stop_rules=self._wish.rules(),
             sight=drawn.sight,
             seed=self._wish.seed,
@@ -163,7 +164,7 @@ class ArmChooser:
                 np.minimum(self._arm.velocities, self._wish.speed_rad_s),
             ),
         )
-        planner = Planner(situation.measurements, drawn.pool, estimator_of(estimate), options)
+        planner = Planner(situation.measurements, drawn.pool, answering(estimate), options)
         turned_down = dict(drawn.turned_down)
         joints_of = dict(drawn.joints)
         answer = planner.ask()

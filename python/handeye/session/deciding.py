@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from handeye.estimation import Estimate, Estimator, Measurements
+from handeye.estimation import Estimate, Measurements
 from handeye.planning import Pool, Proposal, Stop, StopReason
 from handeye.robots.protocol import Goal
 from handeye.session.entry import Entry
@@ -147,16 +147,6 @@ def halt_of(stop: Stop) -> Halt:
         StopReason.NO_CANDIDATE: EndReason.NO_CANDIDATE,
     }
     return Halt(known.get(stop.reason, EndReason.VIEWS_TAKEN), stop.sentence)
-
-
-def estimator_of(estimate: Estimate) -> Estimator:
-    """Return what answers with an estimate that is there already."""
-
-    def answer(measurements: Measurements, previous: Estimate | None = None) -> Estimate:
-        del measurements, previous
-        return estimate
-
-    return answer
 
 
 def decision_of(answer: Proposal, estimate: Estimate, more: Mapping[str, Any]) -> dict[str, Any]:

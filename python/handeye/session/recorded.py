@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from handeye.estimation import Estimate
+from handeye.estimation.estimate import answering
 from handeye.planning import Planner, PlannerOptions, Pool, Stop
 from handeye.planning.prediction import Sight
 from handeye.planning.travel import Travel
@@ -17,7 +18,6 @@ from handeye.session.deciding import (
     Situation,
     Step,
     decision_of,
-    estimator_of,
     halt_of,
 )
 from handeye.session.wish import Wish
@@ -74,12 +74,13 @@ class RecordedChooser:
         pool = Pool.of_views(left)
         options = PlannerOptions(
             policy=self._wish.policy,
+            criterion=self._wish.criterion(estimate, situation.measurements),
             stop_rules=self._wish.rules(),
             sight=Sight(known=True),
             seed=self._wish.seed,
             travel=self._travel(situation, pool),
         )
-        planner = Planner(situation.measurements, pool, estimator_of(estimate), options)
+        planner = Planner(situation.measurements, pool, answering(estimate), options)
         answer = planner.ask()
         if isinstance(answer, Stop):
             halt = halt_of(answer)

@@ -2,10 +2,14 @@
 
 from dataclasses import dataclass, field
 
+from handeye import _core
 from handeye.errors import InputError
+from handeye.estimation import Estimate, Measurements
+from handeye.estimation.work import Work
 from handeye.planning.policies import Policy
 from handeye.planning.policies.next_best_view import NextBestView
 from handeye.planning.stopping import NumberOfViews, StopRule
+from handeye.planning.touch import TouchAccuracy, touch_criterion
 from handeye.session.request import Requested
 from handeye.types.calibration import ModelName
 
@@ -30,8 +34,14 @@ class Wish:
         No joint moves faster.
     joints_err
         Weigh noise and offsets of the joints as causes of error: the description of the arm is known anyway.
+    touch_mm
+        Touch error to reach over the place of work, in place of the accuracy; None for none.
+    work
+        What is seen and touched.
     refine
         Climb from the best candidates to better ones near them, rather than take the best that was drawn.
+    accuracy_px
+        Where the views teach the camera too: how well, see `Requested`. None for a calibrated camera.
 
     Raises
     ------
@@ -50,6 +60,9 @@ class Wish:
     joints_err: bool = True
     refine: bool = True
     policy: Policy = field(default_factory=NextBestView)
+    accuracy_px: float | None = None
+    touch_mm: float | None = None
+    work: Work = field(default_factory=Work)
 
     def __post_init__(self) -> None:
         self.rules()  # checks what they check
@@ -61,6 +74,14 @@ class Wish:
     def rules(self) -> tuple[StopRule, ...]:
         """Return when to stop, in the order asked."""
         number = NumberOfViews(self.most_views)
+        if self.touch_mm is not None:
+            return TouchAccuracy(self.work, self.touch_mm), number
         if self.accuracy_mm is None or self.accuracy_deg is None:
             return (number,)
-        return Requested(self.accuracy_mm, self.accuracy_deg), number
+        return Requested(self.accuracy_mm, self.accuracy_deg, self.accuracy_px), number
+
+    def criterion(self, estimate: Estimate, measurements: Measurements) -> _core.Criterion:
+        """Return what a view is worth now: what it takes off the touch error, where that is asked for."""
+        if self.touch_mm is None or not estimate.determined:
+            return _core.Criterion("entropy")
+        return touch_criterion(estimate, measurements, self.work)

@@ -17,6 +17,7 @@ from handeye.detection import Detection, calibrate_camera
 from handeye.errors import SolveError
 from handeye.robots import Arm, open_arm
 from handeye.robots.displaced import displaced, random_displacements
+from handeye.simulation.mixed_arm import MixedArm, log_uniform, random_twist
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Target, Truth, View
 from handeye.types.arrays import FloatArray
 from handeye.types.pose import inverses, through_twist
@@ -58,6 +59,7 @@ class ErrorKind(StrEnum):
 
 
 MIXTURES = (ErrorKind.MIXTURE_CELL, ErrorKind.MIXTURE_CELL_2, ErrorKind.MIXTURE_RANDOM)
+FACTORS = {ErrorKind.MIXTURE_CELL_2: 2.0}
 BOARD_SCALE = 1e-3
 FOCAL_SHARE = 3e-3
 # Deviation of a smooth field of pixel errors, and its length as a share of the board.
@@ -118,8 +120,26 @@ POSTURE_RAD = np.deg2rad([0.0, -110.0, 110.0, -90.0, -90.0, 0.0])
 MOST_ATTEMPTS = 50
 
 
+@dataclass(frozen=True, eq=False)
+class SimulatedCell:
+    """A recording, and what it came from: X, Y, the camera, and the arm of a mixture."""
+
+    recording: Recording
+    X: Pose
+    Y: Pose
+    camera: Camera
+    arm: MixedArm | None
+
+
 def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *, seed: int = 0) -> Recording:
-    """Return the recording of a cell with its truth, the same for the same number and seed.
+    """Return the recording of a cell with its truth; see `simulate_cell`."""
+    return simulate_cell(kind, number, options, seed=seed).recording
+
+
+def simulate_cell(
+    kind: ErrorKind, number: int, options: CellOptions | None = None, *, seed: int = 0
+) -> SimulatedCell:
+    """Return a cell, the same for the same number and seed.
 
     Raises
     ------
@@ -141,10 +161,12 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
     true_camera = Camera(LENS, PARAMETERS + deviation, *SIZE_PX)
     X, Y = _mount(random, options.mounting)
     count = int(random.integers(options.views[0], options.views[1] + 1))
-    joints, camera_poses = _views(random, arm, true_camera, X, Y, count, options)
+    joints, camera_poses = draw_views(random, arm, true_camera, X, Y, count, options)
+    mixed = None
     if kind in MIXTURES:
         reported, read = arm.forward(joints), joints
-        true = mixed_flange(random, kind, arm, joints)
+        mixed = draw_mixed(random, kind, arm)
+        true = mixed.stand(random, joints)
         camera_poses = np.array([(X @ options.mounting.chain(Pose(pose)) @ Y).matrix for pose in true])
     else:
         reported, read = reported_poses(random, kind, arm, joints, options)
@@ -161,7 +183,7 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
         if field is not None:
             pixels = pixels + field @ random.standard_normal(pixels.shape)
         views.append(View(f"view_{k + 1:02d}", Pose(pose), ids, pixels, joints_rad=read[k].tolist()))
-    return Recording(
+    recording = Recording(
         f"simulated {kind.value} {number}",
         options.mounting,
         _calibrated(target, views)
@@ -172,6 +194,7 @@ def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *
         Truth(X, Y),
         "simulated",
     )
+    return SimulatedCell(recording, X, Y, true_camera, mixed)
 
 
 @cache
@@ -180,20 +203,9 @@ def simulated_arm() -> Arm:
     return open_arm(ARM)
 
 
-def log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> float:
-    """Draw a level between two bounds, evenly in its logarithm."""
-    low, high = bounds
-    return low * (high / low) ** random.uniform()
-
-
 def points_in_camera(T_camera_target: FloatArray, target: Target) -> FloatArray:
     """(P, 3) points of a target in the camera frame, metres."""
     return target.points @ T_camera_target[:3, :3].T + T_camera_target[:3, 3]
-
-
-def random_twist(random: np.random.Generator, metres: float, degrees: float) -> FloatArray:
-    """Draw a twist (6,) with these deviations per axis."""
-    return np.concatenate([random.normal(0, metres, 3), random.normal(0, np.deg2rad(degrees), 3)])
 
 
 def _look(down: FloatArray) -> FloatArray:
@@ -241,7 +253,7 @@ def camera_pose(random: np.random.Generator, camera: Camera, options: CellOption
     return pose if seen.all() and inside.all() else None
 
 
-def _views(
+def draw_views(
     random: np.random.Generator,
     arm: Arm,
     camera: Camera,
@@ -326,44 +338,9 @@ def _field_root(points: FloatArray) -> FloatArray:
     return FIELD_PX * vectors * np.sqrt(np.maximum(values, 0))
 
 
-def mixed_flange(random: np.random.Generator, kind: ErrorKind, arm: Arm, joints: FloatArray) -> FloatArray:
-    """Return where the flange (K, 4, 4) truly stands of an arm in which everything is wrong a little.
-
-    Levels of the cell are those of an arm in good order; drawn ones are log-uniform over a decade about them.
-    """
-    level = {
-        "encoder_deg": 0.005,
-        "offset_deg": 0.01,
-        "length_m": 1e-4,
-        "twist_deg": 0.0,
-        "play_deg": 0.005,
-        "pose_m": 0.0,
-        "pose_deg": 0.0,
-    }
-    if kind is ErrorKind.MIXTURE_RANDOM:
-        bounds = {
-            "encoder_deg": (0.002, 0.02),
-            "offset_deg": (0.005, 0.05),
-            "length_m": (0.05e-3, 0.5e-3),
-            "twist_deg": (0.003, 0.03),
-            "play_deg": (0.002, 0.02),
-            "pose_m": (0.005e-3, 0.1e-3),
-            "pose_deg": (0.0005, 0.01),
-        }
-        level = {name: log_uniform(random, range_) for name, range_ in bounds.items()}
-    if kind is ErrorKind.MIXTURE_CELL_2:
-        level = {name: 2 * value for name, value in level.items()}
-    offsets = float(np.deg2rad(level["offset_deg"])) * random.standard_normal(len(arm))
-    offsets[[0, -1]] = 0.0
-    twist_rad = float(np.deg2rad(level["twist_deg"]))
-    built = displaced(arm, random_displacements(random, arm, level["length_m"], twist_rad))
-    noise = float(np.deg2rad(level["encoder_deg"])) * random.standard_normal(joints.shape)
-    play = 0.5 * float(np.deg2rad(level["play_deg"])) * np.sign(random.standard_normal(joints.shape))
-    both = [
-        _core.se3_exp(np.array([random_twist(random, level["pose_m"], level["pose_deg"]) for _ in joints]))
-        for _ in range(2)
-    ]
-    return both[0] @ built.forward(joints + offsets + noise - play) @ both[1]
+def draw_mixed(random: np.random.Generator, kind: ErrorKind, arm: Arm) -> MixedArm:
+    """Draw the arm of a mixture."""
+    return MixedArm.draw(random, arm, kind is ErrorKind.MIXTURE_RANDOM, FACTORS.get(kind, 1.0))
 
 
 def reported_poses(

@@ -150,4 +150,4 @@ class MockCell:
     def state(self, number: int) -> State:
         """Return what a stop rule is shown after so many views."""
         measurements = Measurements.of(self.mounting, self.camera, self.target, self.views(number))
-        return State(number, paper_estimate(measurements), np.array([0.3, np.nan, 0.1]))
+        return State(measurements, paper_estimate(measurements), np.array([0.3, np.nan, 0.1]))

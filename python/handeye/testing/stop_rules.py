@@ -31,7 +31,7 @@ class StopRuleTests:
     def test_survives_candidates_without_a_gain(self, rule: StopRule, state: State) -> None:
         """A pool in which nothing shows enough is no mistake."""
         for gains in self._gains():
-            answer = rule.verdict(State(state.views, state.estimate, gains))
+            answer = rule.verdict(State(state.measurements, state.estimate, gains))
             assert answer is None or isinstance(answer, Stop)
 
     def _gains(self) -> Iterator[np.ndarray]:

@@ -10,6 +10,7 @@ from handeye.errors import InputError
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 # No length or parameter is larger; squares and products of such numbers still are numbers.
 LARGEST = 1e9

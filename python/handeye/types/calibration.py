@@ -10,6 +10,7 @@ from handeye.types.arrays import FloatArray
 from handeye.types.camera import Camera
 from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
+from handeye.types.touch import TouchMap
 
 # Order of the rows of every covariance of a twist.
 TWIST_ORDER = ("tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")
@@ -220,6 +221,8 @@ class Calibration:
     degrees_of_freedom
         Degrees of freedom of the noise levels behind the covariance; infinite if they were given. Regions
         take quantiles of F(6, degrees of freedom) in place of chi-square.
+    touch
+        How far off the tool lands, where that was asked for.
     """
 
     mounting: Mounting
@@ -242,6 +245,7 @@ class Calibration:
     joint_offsets: tuple[JointOffset, ...] = ()
     link_errors: tuple[LinkError, ...] = ()
     arm_correction: ArmCorrection | None = None
+    touch: TouchMap | None = None
 
     @property
     def results(self) -> dict[str, Pose]:
@@ -271,6 +275,7 @@ class Calibration:
         return {
             **({"joint_offsets": offsets} if offsets else {}),
             **({"link_errors": links} if links else {}),
+            **({} if self.touch is None else {"touch": self.touch.to_dict()}),
             "mounting": self.mounting.value,
             **{name: pose.to_list() for name, pose in self.results.items()},
             "rmse_px": self.rmse_px,

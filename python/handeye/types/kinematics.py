@@ -5,7 +5,7 @@ An arm itself is the business of `handeye.robots`; estimation and planning know 
 
 from typing import Protocol
 
-from handeye.types.arrays import FloatArray
+from handeye.types.arrays import BoolArray, FloatArray
 from handeye.types.mounting import Mounting
 
 
@@ -41,4 +41,8 @@ class Kinematics(Protocol):
 
     def link_jacobians(self, mounting: Mounting, joints: FloatArray) -> FloatArray:
         """(K, 6, m) L of the chain at joint positions (K, n): truly ``A = exp(L l) A_reported``."""
+        ...
+
+    def reach(self, T_base_flange: FloatArray, near: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """(N, n) joint positions at poses (N, 4, 4) as reported, near (N, n), and which (N,) are reached."""
         ...

@@ -57,6 +57,22 @@ def read_camera(path: str | os.PathLike[str]) -> Camera:
         return found.read(document)
 
 
+def read_cameras(path: str | os.PathLike[str]) -> dict[str, Camera]:
+    """Read the cameras of a chain of Kalibr, by their names; the one of any other file is `camera`.
+
+    Where the cameras are in each other is found from the views.
+
+    Raises
+    ------
+    InputError
+        As for `read_camera`.
+    """
+    file = Path(path)
+    with located(str(file)):
+        chain = kalibr.cameras_of(_document(file))
+    return chain or {"camera": read_camera(file)}
+
+
 def _document(file: Path) -> Table:
     suffix = file.suffix.lower()
     if suffix == ".toml":

@@ -24,18 +24,38 @@ def _recognises(document: Table) -> bool:
 
 
 def _read(document: Table) -> Camera:
-    names = [key for key in document if key.startswith("cam")]
+    names = _names(document)
     if len(names) > 1:
         raise InputError(
             f"{len(names)} cameras ({', '.join(names)[:100]}), expected one",
             code="several_cameras",
             hint="keep the camera that took the pictures, under the name cam0",
         )
-    camera = table_at(document, "cam0")
+    return _camera(document, "cam0")
+
+
+def cameras_of(document: Table) -> dict[str, Camera]:
+    """Return the cameras of a chain by their names; empty where the document is none.
+
+    Raises
+    ------
+    InputError
+        A camera that cannot be read.
+    """
+    return {name: _camera(document, name) for name in _names(document)} if _recognises(document) else {}
+
+
+def _names(document: Table) -> list[str]:
+    return [key for key in document if key.startswith("cam")]
+
+
+def _camera(document: Table, name: str) -> Camera:
+    camera = table_at(document, name)
     kind, lens = camera.get("camera_model"), camera.get("distortion_model")
     if kind != "pinhole" or not isinstance(lens, str) or lens not in _MODELS:
         raise InputError(
-            f"cam0: {str(kind)[:40]}-{str(lens)[:40]}, expected pinhole-radtan, pinhole-equi or pinhole-none",
+            f"{name}: {str(kind)[:40]}-{str(lens)[:40]}, expected pinhole-radtan, pinhole-equi or "
+            "pinhole-none",
             code="unknown_lens",
         )
     intrinsics = numbers_at(camera, "intrinsics")

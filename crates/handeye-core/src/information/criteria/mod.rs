@@ -4,6 +4,7 @@ mod eigenvalue_sum;
 mod entropy;
 mod entropy_hand_eye;
 mod min_eigenvalue;
+mod task;
 mod tool_point;
 mod trace;
 
@@ -13,6 +14,7 @@ pub use eigenvalue_sum::EigenvalueSum;
 pub use entropy::Entropy;
 pub use entropy_hand_eye::EntropyHandEye;
 pub use min_eigenvalue::MinEigenvalue;
+pub use task::Task;
 pub use tool_point::{Over, ToolPoint};
 pub use trace::Trace;
 

@@ -1,0 +1,95 @@
+"""`handeye study touch`: whether the tool lands where it is said to."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from handeye.cli.answer import Answer
+from handeye.cli.options import Common, Seed
+from handeye.cli.output import check_folder
+from handeye.cli.progress import progress
+from handeye.cli.study import Trials, write_results
+from handeye.cli.work import check_touch
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def touch(
+    *,
+    cells: int = 50,
+    touches: int = 100,
+    touch_mm: float | None = None,
+    views: int = 10,
+    seed: Seed = 0,
+    workers: Annotated[int | None, Parameter(show_default=False)] = None,
+    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
+    checkpoint: Path | None = None,
+    output: Path | None = None,
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Count how often the tool lands within the stated touch error, at places where nobody looked before.
+
+    Made-up cells in which everything is wrong a little (mixtures of the coverage study), the camera in the
+    hand and beside the robot, the arm described and not. In each a part of known size is seen at random
+    places of a box from random postures, and touched with the tool at random tilts.
+
+    Parameters
+    ----------
+    cells
+        Cells of each of the four groups.
+    touches
+        Random places and postures in each.
+    touch_mm
+        Also choose views one by one out of 40, by entropy and by touch error, and stop at this touch error.
+    views
+        Views after which entropy and touch error are compared.
+    seed
+        Seed of everything random.
+    workers
+        Processes; all processors by default. The results do not depend on it.
+    scheduler
+        Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786.
+    checkpoint
+        Folder that keeps finished pieces: the same command goes on where it was broken off.
+    output
+        Folder for the JSON object; made if it does not exist.
+    """
+    from handeye.studies.touch import TouchStudy, study_touch  # noqa: PLC0415
+
+    check_touch(touch_mm)
+    check_folder(output)
+    with progress("Seeing and touching") as advance:
+        document = study_touch(
+            TouchStudy(cells=cells, touches=touches, views=views, asked_mm=touch_mm, seed=seed),
+            workers=Trials(workers=workers, scheduler=scheduler, checkpoint=checkpoint).crew,
+            progress=advance,
+        )
+    written = write_results(output, "touch", document, lambda: ())
+    return Answer(document, lambda console: _show(console, document, written))
+
+
+def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> None:
+    from rich import box  # noqa: PLC0415 - JSON need not wait for it
+    from rich.table import Table  # noqa: PLC0415
+
+    from handeye.cli import study_tables as tables  # noqa: PLC0415
+    from handeye.cli.wording import figures  # noqa: PLC0415
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("cells")
+    planned = document["asked_mm"] is not None
+    names = ["within", "error mm", "stated mm"]
+    names += ["by entropy mm", "by touch mm", "reached", "kept"] if planned else []
+    for name in names:
+        table.add_column(name, justify="right")
+    for name, group in document["groups"].items():
+        row = [name.replace("_", " "), f"{group['held']:.1%}"]
+        row += [figures(group["error_mm"]), figures(group["radius_mm"])]
+        if planned:
+            row += [figures(group["planned_by_entropy_mm"]), figures(group["planned_by_touch_mm"])]
+            row += [f"{group['asked_met']} of {document['cells']}", f"{group['asked_held']:.1%}"]
+        table.add_row(*row)
+    console.print(table)
+    tables.show_written(console, written)

@@ -1,0 +1,68 @@
+"""Several cameras on the command line: the keys of one camera under its name, and what lies between them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commands import Handeye
+from handeye.datasets import read_rig, write_rig
+from handeye.simulation.cells import ErrorKind
+from handeye.simulation.rigs import RigOptions, simulate_rig
+from handeye.types import RigRecording
+
+
+@pytest.fixture(scope="module")
+def recording() -> RigRecording:
+    """A simulated rig."""
+    return simulate_rig(ErrorKind.MIXTURE_CELL, 1)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, recording: RigRecording) -> Path:
+    """The recording on disk."""
+    write_rig(recording, tmp_path / "rig")
+    return tmp_path / "rig"
+
+
+def test_solve_answers_for_all_cameras(handeye: Handeye, folder: Path, recording: RigRecording) -> None:
+    data = handeye.json("solve", folder, "--robot", "ur5e", "--output", folder / "answer.json")
+    assert list(data["cameras"]) == ["left", "right", "front", "side"]
+    assert recording.truth is not None
+    for name, camera in data["cameras"].items():
+        key = "T_flange_camera" if name in {"left", "right"} else "T_base_camera"
+        off = np.array(camera[key])[:3, 3] - recording.truth.cameras[name].inverse().translation
+        assert 1e3 * np.linalg.norm(off) < 2 * camera["within_95"]["translation_mm"]
+    assert set(data["camera_to_camera"]) == {"T_left_right", "T_front_side"}
+    between = data["camera_to_camera"]["T_left_right"]
+    alone = data["cameras"]["left"]["within_95"]["translation_mm"]
+    assert between["within_95"]["translation_mm"] < alone
+    assert np.array(between["covariance"]).shape == (6, 6)
+    assert data["targets"]["table"]["on"] == "base"
+    assert (folder / "answer.json").is_file()
+    words = handeye("solve", folder).out
+    for expected in (
+        "T_left_right",
+        "left: T_flange_camera",
+        "front: T_base_camera",
+        "with 95 % probability",
+    ):
+        assert expected in words
+
+
+def test_one_camera_answers_as_ever(handeye: Handeye, tmp_path: Path) -> None:
+    one = simulate_rig(ErrorKind.MIXTURE_CELL, 1, RigOptions(on_flange=1, beside=0))
+    write_rig(one, tmp_path / "one")
+    data = handeye.json("solve", tmp_path / "one")
+    assert "cameras" not in data
+    assert "T_flange_camera" in data
+
+
+def test_import_copies_and_other_commands_say_what_they_take(
+    handeye: Handeye, folder: Path, recording: RigRecording
+) -> None:
+    copy = folder.parent / "copy"
+    data = handeye.json("import", folder, copy)
+    assert list(data["cameras"]) == ["left", "right", "front", "side"]
+    assert read_rig(copy).recording == recording
+    assert handeye.fails("solve", folder, "--model", "paper")["code"] == "several_cameras"
