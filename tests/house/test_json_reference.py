@@ -146,6 +146,10 @@ def test_plan(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     )
 
 
+def test_expect(handeye: Handeye) -> None:
+    compare("handeye expect", handeye.json("expect", "--views", "4", "--cells", "1"))
+
+
 def test_validate(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     without_truth = made_recording(8)
     object.__setattr__(without_truth, "truth", None)
@@ -162,6 +166,10 @@ def test_export(handeye: Handeye, shipped: Path) -> None:
         handeye.json("export", shipped, "--format", "urdf"),
         handeye.json("export", shipped, "--format", "moveit_samples"),
     )
+
+
+def test_devices(handeye: Handeye) -> None:
+    compare("handeye devices", handeye.json("devices"))
 
 
 def test_target(handeye: Handeye, tmp_path: Path) -> None:
@@ -225,6 +233,8 @@ def test_twin(handeye: Handeye) -> None:
 def test_simulated_studies(handeye: Handeye) -> None:
     data = handeye.json("study", "methods", "--trials", "1", "--workers", "1")
     compare("handeye study methods", data)
+    scale = handeye.json("study", "scale", "--trials", "40", "--workers", "1", "--no-cluster")
+    compare("handeye study scale", scale)
     few = ("--trials", "1", "--workers", "1")
     compare("handeye study policies", handeye.json("study", "policies", "--budgets", "5", *few))
     one_step = ("--candidates", "3", "--draws", "2", "--arm", "exact")

@@ -18,6 +18,7 @@ from handeye.datasets import (
 from handeye.datasets.bags import importer as bags
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Imported, Importer
+from handeye.datasets.joint_states import Forward
 from handeye.datasets.pose_rows import NOTHING_STATED, Statement
 from handeye.datasets.reading import existing_folder, is_file
 from handeye.datasets.recording_format import LoadedRecording
@@ -56,6 +57,7 @@ def load(
     mounting: Mounting | None = None,
     poses: str | None = None,
     stated: Statement | None = None,
+    arm: Forward | None = None,
 ) -> LoadedRecording | Imported:
     """Read a folder: a recording of ours, or images and poses in a layout of others.
 
@@ -65,7 +67,7 @@ def load(
         The folder, or the file in it that tells the layout (such as `recording.toml`).
     layout
         Name of one of `IMPORTERS`; None to recognise it.
-    target, pattern, mounting, poses, stated
+    target, pattern, mounting, poses, stated, arm
         What the files of others leave open, see `ImportOptions`; a recording leaves nothing open.
 
     Returns
@@ -80,7 +82,7 @@ def load(
     InputError
         Nothing that can be read, or not what it claims to be.
     """
-    options = ImportOptions(target, pattern, mounting, poses, stated or NOTHING_STATED)
+    options = ImportOptions(target, pattern, mounting, poses, stated or NOTHING_STATED, arm)
     folder = _place(path)
     if layout is not None:
         importer = IMPORTERS.get(layout)
@@ -90,7 +92,7 @@ def load(
             )
         return importer.read(folder, options)
     if is_file(folder / FILE_NAME):
-        if options != ImportOptions():
+        if options != ImportOptions(arm=arm):
             raise InputError(
                 f"{folder}: a recording says its target, mounting and poses itself",
                 code="options_unused",
