@@ -19,7 +19,6 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = [
     {"planning"},
     {"information"},
-    {"evidence"},
     {"estimation"},
     {"least_squares", "planar_pose"},
     {"pose", "closed_form"},

@@ -167,6 +167,10 @@ def test_export(handeye: Handeye, shipped: Path) -> None:
     )
 
 
+def test_devices(handeye: Handeye) -> None:
+    compare("handeye devices", handeye.json("devices"))
+
+
 def test_target(handeye: Handeye, tmp_path: Path) -> None:
     compare("handeye target", handeye.json("target", "chessboard", "--output", tmp_path / "board.svg"))
 

@@ -12,7 +12,7 @@ use crate::errors::{invalid, to_python};
 
 /// Registers the functions of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(lens_parameter_count, module)?)?;
+    module.add_function(wrap_pyfunction!(lenses, module)?)?;
     module.add_function(wrap_pyfunction!(project, module)?)?;
     module.add_function(wrap_pyfunction!(project_jacobians, module)?)?;
     module.add_function(wrap_pyfunction!(unproject, module)?)?;
@@ -55,8 +55,8 @@ pub fn features(py: Python<'_>, points: &Array<'_>, radii: &Array<'_>) -> PyResu
 }
 
 #[pyfunction]
-fn lens_parameter_count(py: Python<'_>, lens: &str) -> PyResult<usize> {
-    Lens::from_name(lens).map(Lens::parameter_count).map_err(|error| to_python(py, error))
+fn lenses() -> Vec<(&'static str, Vec<&'static str>)> {
+    Lens::ALL.iter().map(|lens| (lens.name(), lens.coefficients().to_vec())).collect()
 }
 
 #[pyfunction]

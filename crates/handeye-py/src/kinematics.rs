@@ -13,6 +13,14 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Chain>()
 }
 
+fn frame_of(py: Python<'_>, name: &str) -> PyResult<Frame> {
+    match name {
+        "base" => Ok(Frame::Base),
+        "flange" => Ok(Frame::Flange),
+        other => Err(invalid(py, &format!("frame must be base or flange, found \"{other}\""))),
+    }
+}
+
 /// A serial arm.
 #[pyclass(frozen, module = "handeye._core")]
 pub struct Chain {
@@ -91,13 +99,7 @@ impl Chain {
         joints: Array<'py>,
         frame: &str,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let frame = match frame {
-            "base" => Frame::Base,
-            "flange" => Frame::Flange,
-            other => {
-                return Err(invalid(py, &format!("frame must be base or flange, found \"{other}\"")));
-            }
-        };
+        let frame = frame_of(py, frame)?;
         let (count, values) = self.configurations(py, &joints)?;
         let n = self.inner.len();
         let jacobians = py
@@ -107,6 +109,32 @@ impl Chain {
             })?
             .map_err(|e| to_python(py, e))?;
         Ok(convert::array(py, &[count, 6, n], jacobians))
+    }
+
+    /// Twists `(N, 6, m)` of the flange at joints `(N, n)`, per way of displacing a joint on the link before it: `joint`
+    /// of each, and its twist `(m, 6)` in the joint's frame before it moves; in the frame "base" or "flange".
+    fn displacements<'py>(
+        &self,
+        py: Python<'py>,
+        joints: Array<'py>,
+        frame: &str,
+        which: Vec<usize>,
+        twists: Array<'py>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let frame = frame_of(py, frame)?;
+        let (count, values) = self.configurations(py, &joints)?;
+        let twists = convert::vectors::<6>(py, "twists", &twists)?;
+        if twists.len() != which.len() {
+            return Err(invalid(py, "as many joints as twists are needed"));
+        }
+        let ways: Vec<_> = which.into_iter().zip(twists).collect();
+        let found = py
+            .core(|| {
+                let mut found = vec![0.0; count * 6 * ways.len()];
+                self.inner.displacements_all(frame, &values, &ways, &mut found).map(|()| found)
+            })?
+            .map_err(|e| to_python(py, e))?;
+        Ok(convert::array(py, &[count, 6, ways.len()], found))
     }
 
     /// Joints `(N, n)` that reach poses `(N, 4, 4)`, which of them do, and how far off the others are (m, rad).

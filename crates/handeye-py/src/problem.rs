@@ -98,16 +98,16 @@ impl Problem {
         if let Some(k) = views.iter().find(|k| **k >= self.inner.view_count()) {
             return Err(invalid(py, &format!("view {k} of {}", self.inner.view_count())));
         }
-        Ok(py.core(|| {
+        py.core(|| {
             views
                 .iter()
                 .map(|k| {
                     let pose = x * *self.inner.motion(*k) * y;
-                    view_block(&self.inner, *k, self.inner.camera(), &pose, 1.0, None)
+                    view_block(&self.inner, *k, self.inner.camera(), &pose, 1.0, None, None)
                         .map_or(f64::INFINITY, |b| b.squared_px)
                 })
                 .sum()
-        })?)
+        })
     }
 }
 

@@ -13,6 +13,7 @@ COMMANDS = (
     ("export", "handeye.cli.export:export", "Write the answer in the format of another program."),
     ("report", "handeye.cli.report:report", "Write one page about a calibration."),
     ("detect", "handeye.cli.detect:detect_in", "Say what is seen in each picture, and draw it."),
+    ("devices", "handeye.cli.devices:devices", "List drivers of robots and cameras, and what each sees."),
     ("target", "handeye.cli.target:target", "Write a calibration target to print."),
     ("demo", "handeye.cli.demo:demo", "Show what choosing views is worth."),
     ("study", "handeye.cli.study:study", "Compare policies and models on public data."),

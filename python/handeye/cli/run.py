@@ -24,13 +24,14 @@ from handeye.planning.constraints import ViewLimits
 from handeye.robots import open_arm
 from handeye.robots.manual import describe
 from handeye.robots.protocol import Goal
-from handeye.session.configuration import Prepared, begin, go_on, prepare
+from handeye.session.configuration import begin, go_on, prepare
 from handeye.session.deciding import START_VIEWS
 from handeye.session.drivers import REPLAY, Person
 from handeye.session.entry import Entry
 from handeye.session.journal import read_settings
 from handeye.session.loop import End, Session
 from handeye.session.observer import Observer
+from handeye.session.prepared import Prepared
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore

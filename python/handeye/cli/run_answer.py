@@ -11,9 +11,9 @@ from handeye.cli.answer import Answer
 from handeye.cli.session_report import report_of_session
 from handeye.errors import DetectionError, DeviceError, HandeyeError
 from handeye.estimation.lens_confidence import lens_difference_px
-from handeye.session.configuration import Prepared
 from handeye.session.deciding import EndReason
 from handeye.session.loop import End
+from handeye.session.prepared import Prepared
 from handeye.session.settings import Configuration
 from handeye.types.calibration import MM_PER_M, ModelName
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye.types.arrays import FloatArray
-from handeye.types.camera import Camera
+from handeye.types.camera import OPENCV_LENSES, Camera
 from handeye.types.ordinary_lens import DISTORTION_SIGMAS
 
 # Without a covariance: relative focal length, principal point as a share of the width, and coefficients.
@@ -14,6 +14,8 @@ DEFAULT_CENTRE_SIGMA = 0.002
 DEFAULT_DISTORTION_SIGMA = 0.02
 # A lens that was never measured (no coefficients, or all zero): what ordinary lenses are like.
 UNMEASURED_LENS = "brown_conrady_5"
+# Lenses for which zeros say that nothing was measured.
+UNMEASURED_FORMS = OPENCV_LENSES - {"kannala_brandt"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ def camera_prior(camera: Camera, *, fixed: bool = False) -> CameraPrior:
         return CameraPrior(camera, (), np.zeros((0, 0)), np.zeros(0), inflated=False, from_these_pixels=False)
     covariance = camera.covariance
     if covariance is None:
-        unmeasured = camera.lens != "kannala_brandt" and not camera.distortion.any()
+        unmeasured = camera.lens in UNMEASURED_FORMS and not camera.distortion.any()
         if unmeasured:
             zeros = np.zeros(len(DISTORTION_SIGMAS[UNMEASURED_LENS]))
             camera = Camera(UNMEASURED_LENS, np.concatenate([camera.parameters[:4], zeros]), *camera.size_px)
