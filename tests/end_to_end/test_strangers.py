@@ -15,6 +15,7 @@ from datasets.test_pose_pairs import easy_samples
 from folders import PICTURE_BOARD, PICTURE_CAMERA, photographed
 from handeye.datasets import Statement, read_pose_rows
 from handeye.datasets.toml_text import toml_text
+from handeye.export import read_transform
 from handeye.notations import NOTATIONS, Unit
 from handeye.types import Mounting, Pose
 from poses_written import KUKA_HEAD, MM, UR_HEAD, table
@@ -71,6 +72,12 @@ def test_samples_of_easy_handeye2(tmp_path: Path, handeye: Handeye) -> None:
     (tmp_path / "demo.samples").write_text(easy_samples(Mounting.EYE_IN_HAND))
     answer = handeye.json("solve", tmp_path / "demo.samples", "--mounting", "eye_in_hand")
     assert off_mm(answer["T_flange_camera"], SAMPLES_X.inverse()) < 0.1
+    exported = handeye.json(
+        "export", tmp_path / "demo.samples", "--mounting", "eye_in_hand", "--format", "easy_handeye2"
+    )
+    (tmp_path / "demo.calib").write_text(exported["text"])
+    back = read_transform(tmp_path / "demo.calib").T_parent_child
+    assert np.abs(back.matrix - np.array(answer["T_flange_camera"])).max() < 1e-9
 
 
 def test_a_bag_beside_its_board(tmp_path: Path, handeye: Handeye) -> None:
