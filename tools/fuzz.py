@@ -361,6 +361,7 @@ def main() -> int:
     parser.add_argument("--only", type=int, help="number of one input, tried here")
     options = parser.parse_args()
     began, counts, bad, slowest = time.monotonic(), Counter[str](), 0, (0.0, -1, "")
+    said = began
     with tempfile.TemporaryDirectory() as name:
         inputs = Inputs(Path(name), options.seed)
         if options.only is not None:
@@ -380,8 +381,8 @@ def main() -> int:
                     kept.parent.mkdir(parents=True, exist_ok=True)
                     inputs.make(number, kept)
                     print(f"input {number}, {example}: {wrong}", flush=True)
-            if (first // BATCH) % 20 == 0 or time.monotonic() - began > options.seconds:
-                done = counts.total()
+            if time.monotonic() - said > 60 or time.monotonic() - began > options.seconds:
+                said, done = time.monotonic(), counts.total()
                 print(
                     f"{done} inputs, {bad} wrong, slowest {slowest[0]:.1f} s ({slowest[2]}, {slowest[1]}), "
                     f"{time.monotonic() - began:.0f} s",

@@ -144,6 +144,10 @@ def test_plan(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     )
 
 
+def test_expect(handeye: Handeye) -> None:
+    compare("handeye expect", handeye.json("expect", "--views", "4", "--cells", "1"))
+
+
 def test_validate(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     without_truth = made_recording(8)
     object.__setattr__(without_truth, "truth", None)
@@ -160,6 +164,10 @@ def test_export(handeye: Handeye, shipped: Path) -> None:
         handeye.json("export", shipped, "--format", "urdf"),
         handeye.json("export", shipped, "--format", "moveit_samples"),
     )
+
+
+def test_devices(handeye: Handeye) -> None:
+    compare("handeye devices", handeye.json("devices"))
 
 
 def test_target(handeye: Handeye, tmp_path: Path) -> None:

@@ -51,34 +51,27 @@ def labeled(camera: Camera, target: Target, detection: Detection, T_base: Pose, 
 
 
 def objection(
-    camera: Camera,
-    target: Target,
-    view: View,
-    estimate: Estimate | None,
-    views: int,
-    *,
-    learning: bool = False,
+    camera: Camera | None, target: Target, view: View, estimate: Estimate | None, views: int
 ) -> str | None:
     """Say why a view cannot be true, None if it may be.
 
     Parameters
     ----------
+    camera
+        As it was given, or as the views teach it, this one included; None where they do not yet.
     estimate
         What the other views say.
     views
         How many these are.
-    learning
-        Whether the views teach the camera: one that does not fit it may be right, and the camera wrong.
     """
+    if camera is None:
+        return _no_plane(target, view)
     try:
         pose = view_pose(camera, target, view)
     except HandeyeError as error:
-        return _no_plane(target, view) if learning else error.message.removeprefix(f"view {view.name}: ")
+        return error.message.removeprefix(f"view {view.name}: ")
     if pose.rmse_px > LARGEST_RMSE_PX:
-        fits = f"its points fit the target only to {pose.rmse_px:.1f} px"
-        return _no_plane(target, view) if learning else fits
-    if learning and estimate is None:
-        return _no_plane(target, view)
+        return f"its points fit the target only to {pose.rmse_px:.1f} px"
     if estimate is None or views < FEWEST_WITNESSES or not estimate.determined:
         return None
     A = estimate.mounting.chain(view.T_base_flange)

@@ -28,7 +28,7 @@ LENSES = {
 _CENTRE_SIGMAS = (0.5, 0.5, 0.5, 0.5)
 PARAMETER_SIGMAS = {
     "brown_conrady_5": (*_CENTRE_SIGMAS, 5e-4, 2e-3, 5e-5, 5e-5, 2e-3),
-    "kannala_brandt": (*_CENTRE_SIGMAS, 5e-4, 1e-3, 1e-3, 5e-4),
+    "kannala_brandt": (*_CENTRE_SIGMAS, 2e-4, 2e-4, 1e-4, 5e-5),
 }
 
 

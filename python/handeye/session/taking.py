@@ -92,9 +92,10 @@ class Taker:
         if unchanged(view, self._store.recording.views):
             why = "the target did not move in the picture, though the arm did"
             return Missed(Failure.STALE_IMAGE, why, moved=True, digest=seen.digest, standing=seen.reading)
-        learning = self._store.self_calibration is not None
-        taken = len(self._store.recording.views)
-        why = objection(self._camera(estimate), cell.target, view, estimate, taken, learning=learning)
+        taken, learning = self._store.recording.views, self._store.self_calibration
+        # A view that a young lens does not fit may be right, and the lens wrong: it is asked with the view.
+        camera = cell.camera if learning is None else learning.camera((*taken, view))
+        why = objection(camera, cell.target, view, estimate, len(taken))
         if why is not None:
             return Missed(Failure.INCONSISTENT, why, moved=True, digest=seen.digest, standing=seen.reading)
         return view, seen
