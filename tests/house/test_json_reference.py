@@ -149,6 +149,10 @@ def test_plan(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     )
 
 
+def test_expect(handeye: Handeye) -> None:
+    compare("handeye expect", handeye.json("expect", "--views", "4", "--cells", "1"))
+
+
 def test_validate(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     without_truth = made_recording(8)
     object.__setattr__(without_truth, "truth", None)
