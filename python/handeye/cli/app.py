@@ -7,6 +7,7 @@ COMMANDS = (
     ("run", "handeye.cli.run:run", "Drive the arm from view to view until the answer is good enough."),
     ("solve", "handeye.cli.solve:solve", "Calibrate from a folder of views."),
     ("ui", "handeye.cli.ui:ui", "Open the page in the browser, on a folder or a simulated cell."),
+    ("expect", "handeye.cli.expect:expect", "Say what accuracy to expect of a cell before it is built."),
     ("plan", "handeye.cli.plan:plan", "Rank the views to take next."),
     ("validate", "handeye.cli.validate:validate", "Test how far a calibration holds."),
     ("import", "handeye.cli.importing:import_folder", "Turn images and robot poses into a recording."),
