@@ -9,8 +9,8 @@ From views to an answer: `open_folder` (with `SourceOptions` for what the files 
 and poses into a `Recording` of `View`s with a `Camera` and a `Target`; `handeye.solve` finds the answer, and
 `plan` which view to take next; `open_rig` and `solve_rig` do the same for several cameras and boards at once.
 `detect` finds a target in one picture. `read_recording`, `write_recording`, `read_camera` and `read_target`
-are for files of ours and others; a `Pose` is a transform, `Mounting` says where the camera sits, and everything that
-goes wrong is a `HandeyeError` with a code and a hint.
+are for files of ours and others; a `Pose` is a transform, `Mounting` says where the camera sits, and
+everything that goes wrong is a `HandeyeError` with a code and a hint.
 
 The rooms below have more: `handeye.estimation`, `handeye.planning`, `handeye.session` (driving an arm),
 `handeye.export`, `handeye.testing`. On the command line: `handeye --help`; in the browser: `handeye ui`.
