@@ -220,6 +220,16 @@ def test_simulated_studies(handeye: Handeye) -> None:
     compare("handeye study coverage", data)
 
 
+def test_check_and_diff(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
+    log = tmp_path / "nights.jsonl"
+    compare(
+        "handeye check",
+        handeye.json("check", shipped),
+        handeye("check", shipped, shipped, "--log", log, "--json").data,
+    )
+    compare("handeye diff", handeye.json("diff", shipped, shipped))
+
+
 def test_touch(handeye: Handeye) -> None:
     options = ("--cells", "1", "--touches", "3", "--workers", "1")
     compare("handeye study touch", handeye.json("study", "touch", *options))
