@@ -19,7 +19,6 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = [
     {"planning"},
     {"information"},
-    {"evidence"},
     {"estimation"},
     {"least_squares", "planar_pose"},
     {"pose", "closed_form"},
@@ -27,7 +26,7 @@ LAYERS = [
     {"se3"},
     {"imaging", "batched_algebra", "positive"},
     {"simd"},
-    {"error"},
+    {"error", "interrupt"},
 ]
 # Rooms that tests may use and nothing else.
 FOR_TESTS = {"testing"}

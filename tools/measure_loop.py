@@ -72,11 +72,12 @@ def cell(kind: str, number: int) -> Configuration:
     )
 
 
-def disturbed(number: int) -> tuple[str, Configuration]:
-    """Return a run with one kind of fault at a tenth to three tenths of the attempts."""
+def disturbed(number: int, rate: float | None = None) -> tuple[str, Configuration]:
+    """Return a run with one kind of fault at a tenth to three tenths of the attempts, or at a rate."""
     fault = FAULTS[number % len(FAULTS)]
     random = np.random.default_rng([19, number])
-    rates = FaultRates(**{fault: float(random.uniform(0.1, 0.3))})
+    drawn = float(random.uniform(0.1, 0.3))
+    rates = FaultRates(**{fault: drawn if rate is None else rate})
     quiet = cell(MODELLED[number % len(MODELLED)], 500 + number)
     return fault, replace(
         quiet,
@@ -117,6 +118,7 @@ def main() -> int:
     )
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=MODELLED)
     parser.add_argument("--faults", action="store_true", help="runs with faults")
+    parser.add_argument("--rate", type=float, help="share of the attempts that a fault befalls")
     parser.add_argument(
         "--beside", type=int, default=40, help="fault runs that have an undisturbed one beside"
     )
@@ -141,7 +143,7 @@ def main() -> int:
                     continue
                 line: dict[str, Any] = {"kind": kind, "number": number}
                 if kind == "faults":
-                    fault, configuration = disturbed(number)
+                    fault, configuration = disturbed(number, options.rate)
                     line |= {"fault": fault} | run(configuration)
                     if number < options.beside:
                         calm = replace(configuration.simulation, faults=None)

@@ -44,6 +44,7 @@ T_SAFETY, T_JOURNAL, T_CALLS = (
 T_READING, T_FOLDER, T_MANUAL = "robots/test_reading.py", "cameras/test_folder.py", "robots/test_manual.py"
 T_RULES, T_LOOP, T_BREAKS = "session/test_rules.py", "session/test_loop.py", "session/test_breaks.py"
 T_COLLISIONS = "planning/test_collisions.py"
+SELF, T_SELF = "session/self_calibration.py", "session/test_self_calibration.py"
 
 # fmt: off
 MUTANTS = (
@@ -77,7 +78,7 @@ MUTANTS = (
     Mutant("reading: type", READING, "if not isinstance(answer, Reading):", "if False:", T_READING),
     Mutant("reading: degrees named", READING, 'yield "the joint positions are in degrees, expected radians", radians', "pass", T_READING),
     Mutant("reading: inverse named", READING, "(inverse, reported.inverse()),", "", T_READING),
-    Mutant("checked before every motion", ATTEMPT, "return checked_reading(answer, self.arm, joints_needed=not self.by_hand, expected=expected)", "return typed_reading(answer)", T_SAFETY),
+    Mutant("checked before every motion", ATTEMPT, "reading = checked_reading(answer, self.arm, joints_needed=not self.by_hand, expected=expected)", "reading = typed_reading(answer)", T_SAFETY),
     Mutant("contract at the start", LOOP, "        check_at_rest(self._cell)\n", "", T_SAFETY),
     Mutant("stop works before the first motion", "session/contract.py", '    if why is not None:\n        raise DeviceError(\n            f"the robot cannot be stopped', '    if False:\n        raise DeviceError(\n            f"the robot cannot be stopped', T_SAFETY),
     Mutant("rest before the first motion", "session/contract.py", "if not is_near(first.T_base_flange, second.T_base_flange, REST_M, REST_RAD):\n        raise", "if False:\n        raise", T_SAFETY),
@@ -95,7 +96,7 @@ MUTANTS = (
     Mutant("what can be shown", "errors.py", 'c if c.isprintable() else " " if c.isspace() else "?" for c in cut', "c for c in cut", T_CALLS),
     Mutant("a driver's exit ends no session", CALLS, "except BaseException as error:  # noqa: BLE001 - whatever a driver raises", "except Exception as error:", T_CALLS),
     Mutant("a robot that hangs ends the session", LOOP, "if self._cell.robot_calls.pending:", "if False:", T_SAFETY),
-    Mutant("a session told to go on goes on", LOOP, "self._forgiven_up_to = len(situation.entries)", "pass", T_SAFETY),
+    Mutant("a session told to go on goes on", LOOP, "self._forgiven_up_to = situation.entries[-1].number", "pass", T_SAFETY),
     Mutant("views of other arms left out", LOOP, "if (len(view.joints_rad) == len(arm) if view.joints_rad is not None else not needed)", "if True", T_SAFETY),
     # Pictures of now.
     Mutant("stale frames", "cameras/capture.py", "STALE_FRAMES = 5", "STALE_FRAMES = 0", "cameras/test_capture.py"),
@@ -117,13 +118,27 @@ MUTANTS = (
     Mutant("settings are checked", JOURNAL, "    if changed:\n", "    if False:\n", T_JOURNAL),
     Mutant("nothing deleted", STORE, "    if more:\n", "    if False:\n", T_JOURNAL),
     Mutant("edited views", STORE, "elif not _same(view, known[name]):", "elif False:", T_JOURNAL),
-    Mutant("edited camera or mounting", STORE, "if found.recording.to_dict() != base.to_dict():", "if False:", T_JOURNAL),
+    Mutant("edited camera or mounting", STORE, "if kept.to_dict() != base.to_dict():", "if False:", T_JOURNAL),
     Mutant("lost files made again", STORE, "        if not current:\n", "        if False:\n", T_JOURNAL),
     Mutant("partial files", STORE, "            remove_partials(part)", "            pass", T_JOURNAL),
     Mutant("another arm half-way", "session/settings.py", "if settings.get(name, fingerprint) != fingerprint:", "if False:", T_JOURNAL),
     Mutant("one process at a time", STORE, "fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", T_BREAKS + "::test_two_processes_do_not_write_one_session"),
     Mutant("interruption stops the arm", LOOP, "            self._cell.stop()\n            raise", "            raise", T_BREAKS + "::test_an_interruption_stops_the_arm_and_leaves_the_session_whole"),
+    Mutant("torn line said", JOURNAL, "torn + len(rest))", "0)", T_JOURNAL),
+    Mutant("zeros for a line", JOURNAL, 'if whole and not rest.strip(b"\\0") and b"\\0" in whole[-1]:', "if False:", T_JOURNAL),
+    # A camera that nobody has calibrated.
+    Mutant("lens is part of the request", "session/request.py", "if lens_px > self.lens_px:", "if False:", T_SELF),
+    Mutant("a wrong view does not teach", SELF, "return worst if errors[worst] > limit else None", "return None", T_SELF),
+    Mutant("no picture of a flat target", "session/judging.py", "if not rms <= LARGEST_BEND * extent:", "if False:", T_SELF),
+    Mutant("pixels of the same pictures count once", SELF, "from_views=True", "from_views=False", T_SELF),
+    Mutant("edited camera of a session that learns it", STORE, "if same_camera(kept.camera, then):", "if True:", T_SELF),
+    Mutant("the camera follows from the views", STORE, "grown if self.self_calibration is None else", "grown if True else", T_SELF),
+    Mutant("begun with what was known then", "session/configuration.py", "recording = store.begun_with", "recording = store.recording", T_SELF),
+    Mutant("a turn is no other lens", "estimation/lens_confidence.py", "return off - turns @ explained", "return off", "estimation/test_lens_confidence.py"),
+    Mutant("tails of the lens", "estimation/lens_confidence.py", "estimate.degrees_of_freedom, probability", "np.inf, probability", "estimation/test_lens_confidence.py"),
+    Mutant("ordinary lenses are believed in", "detection/intrinsics.py", "prior=ParameterPrior(mean, noise**2 / sigmas**2)", "prior=None", "detection/test_intrinsics.py"),
     # Statistics, and what people type.
+    Mutant("one view that stands out is looked at", "session/judging.py", "off.max() <= limit and", "True or", "session/test_judging.py"),
     Mutant("tails of Student", "estimation/confidence.py", "if np.isfinite(degrees_of_freedom):", "if False:", T_RULES),
     Mutant("both radii", "session/request.py", "or now.rotation_deg > self.rotation_deg", "", T_RULES),
     Mutant("probability", "estimation/confidence.py", "PROBABILITY = 0.95", "PROBABILITY = 0.9", T_RULES),
@@ -134,10 +149,11 @@ MUTANTS = (
     Mutant("units by hand", MANUAL, "if _NEAREST_M <= far <= reach:", "if True:", T_MANUAL),
     Mutant("joints that nobody told", MANUAL, "shown = goal.joints_rad if self._arm is None or self._joints_told else None", "shown = goal.joints_rad", T_MANUAL),
     Mutant("asked again after a refusal", MANUAL, "        self._doubtful = True\n        self._reading = self._read(f", "        self._reading = self._read(f", T_MANUAL),
-    Mutant("millimetres of the pendant", MANUAL, "[*(value / 1e3 for value in numbers[:3]), *numbers[3:]]", "numbers", T_MANUAL),
+    Mutant("millimetres of the pendant", "notations/table.py", '"mm": 1e-3', '"mm": 1.0', T_MANUAL),
 )
 
 KINEMATICS = "crates/handeye-core/src/kinematics"
+ESTIMATION = "crates/handeye-core/src/estimation"
 CHAIN, INVERSE, BATCH = (f"{KINEMATICS}/{name}.rs" for name in ("chain", "inverse", "batch"))
 RUST = (
     Mutant("core: upper limits", CHAIN, "(j.lower..=j.upper).contains(q)", "*q >= j.lower", "kinematics"),
@@ -148,6 +164,10 @@ RUST = (
     Mutant("core: answers within the limits", INVERSE, "    q.clamp(lower, upper)\n", "    q\n", "kinematics"),
     Mutant("core: answers that reach", INVERSE, "off_m <= options.tolerance_m", "off_m <= 1e5 * options.tolerance_m", "kinematics"),
     Mutant("core: answers that turn", INVERSE, "off_rad <= options.tolerance_rad", "off_rad <= 1e5 * options.tolerance_rad", "kinematics"),
+    Mutant("core: pixels of the same pictures count once", f"{ESTIMATION}/linearisation.rs", "if cell.cameras[m.camera].from_these_pixels {", "if false && cell.cameras[m.camera].from_these_pixels {", "estimation"),
+    Mutant("core: pixel noise of a view", f"{ESTIMATION}/linearisation.rs", "&(m.pose.covariance * m.variance_px2)", "&m.pose.covariance", "estimation"),
+    Mutant("core: stops where it is told", "crates/handeye-core/src/interrupt.rs", "if ASK.get().is_some_and(|ask| ask()) {", "if false {", "interrupt"),
+    Mutant("core: asks nobody afterwards", "crates/handeye-core/src/interrupt.rs", "ASK.set(self.0);", "let _ = self.0;", "interrupt"),
     Mutant("core: other postures", INVERSE, "const DISTINCT: f64 = 1e-3;", "const DISTINCT: f64 = 10.0;", "kinematics"),
 )
 

@@ -28,8 +28,8 @@ def nearest_rigid(T: ArrayLike) -> NDArray[float64]:
 
 # Cameras
 
-def lens_parameter_count(lens: str) -> int:
-    """Number of parameters of a lens, focal lengths and principal point included."""
+def lenses() -> list[tuple[str, list[str]]]:
+    """Every lens, and the names of its coefficients after `fx, fy, cx, cy`."""
 
 def project(
     lens: str, parameters: ArrayLike, points_camera: ArrayLike
@@ -386,6 +386,9 @@ class Predictor:
         `threads` (0: as many as pay off) and `vector_unit` change nothing beyond rounding.
         """
 
+    def in_sight(self, motions: ArrayLike) -> list[bool]:
+        """Which candidates (N, 4, 4) would show enough of the target."""
+
     def informations(
         self, motions: ArrayLike, *, arm: tuple[ArrayLike, ArrayLike] | None = None
     ) -> NDArray[float64]:
@@ -413,7 +416,16 @@ class PoseMeasurements:
         *,
         free_camera: list[int] | None = None,
         board_scale: bool = False,
-    ) -> None: ...
+        sigmas_px: Sequence[ArrayLike | None] | None = None,
+    ) -> None:
+        """`sigmas_px`: deviations of the points of each view, which tell better points from worse."""
+    @staticmethod
+    def stated(motions: ArrayLike, poses: ArrayLike, covariances: ArrayLike) -> PoseMeasurements:
+        """Poses (K, 4, 4) that somebody else's detector states.
+
+        With the covariance (K, 6, 6) of their left perturbation, and the middle (K, 4, 4) of each chain.
+        """
+
     def __len__(self) -> int: ...
     @property
     def variances_px2(self) -> list[float]: ...
@@ -512,6 +524,15 @@ class Chain:
         """Twists (N, 6, n) per joint.
 
         `T(q + dq) = exp(J dq) T(q)` for "base", `T(q) exp(J dq)` for "flange".
+        """
+
+    def displacements(
+        self, joints: ArrayLike, frame: str, which: list[int], twists: ArrayLike
+    ) -> NDArray[float64]:
+        """Twists (N, 6, m) of the flange per way of displacing a joint on the link before it.
+
+        `which` joint each way displaces, and its twist (m, 6) in the joint's frame before it moves; frames as
+        of `jacobians`.
         """
 
     def inverse(

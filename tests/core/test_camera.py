@@ -26,9 +26,10 @@ COEFFICIENTS = {
     "brown_conrady_8": BROWN[:8],
     "brown_conrady_12": BROWN,
     "kannala_brandt": FISHEYE,
+    "division": (-0.2,),
 }
 LENSES = sorted(COEFFICIENTS)
-BROWNS = [lens for lens in LENSES if lens != "kannala_brandt"]
+BROWNS = [lens for lens in LENSES if lens not in {"kannala_brandt", "division"}]
 
 
 def parameters(lens: str) -> Array:
@@ -60,7 +61,7 @@ def grid(radius: float) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("lens", LENSES)
 def test_parameter_counts(lens: str) -> None:
-    assert _core.lens_parameter_count(lens) == len(parameters(lens))
+    assert len(dict(_core.lenses())[lens]) == len(COEFFICIENTS[lens])
 
 
 @pytest.mark.parametrize("lens", BROWNS)
@@ -128,7 +129,7 @@ def test_the_fold_of_the_distortion_is_not_seen() -> None:
     hnp.arrays(np.float64, (5, 3), elements=st.floats()),
 )
 def test_a_valid_pixel_is_a_finite_pixel(lens: str, coefficients: Array, points: Array) -> None:
-    count = _core.lens_parameter_count(lens) - 4
+    count = len(dict(_core.lenses())[lens])
     camera = np.concatenate([MATRIX, coefficients[:count]])
     uv, d_point, d_parameters, valid = _core.project_jacobians(lens, camera, points)
     assert np.isfinite(uv[valid]).all()
@@ -156,6 +157,8 @@ def polygon_centroid(lens: str, T: Array, centre: Array, radius: float) -> Array
     if lens == "kannala_brandt":
         uv, _ = cv2.fisheye.projectPoints(rim[None], rotation, T[:3, 3], opencv_matrix(), coefficients)
         uv = uv[0]
+    elif lens == "division":
+        uv, _ = _core.project(lens, parameters(lens), rim @ T[:3, :3].T + T[:3, 3])
     else:
         uv, _ = cv2.projectPoints(rim, rotation, T[:3, 3], opencv_matrix(), coefficients)
         uv = uv[:, 0]

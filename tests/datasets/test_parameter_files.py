@@ -8,7 +8,7 @@ import pytest
 
 from handeye.datasets import read_camera, read_target
 from handeye.errors import InputError
-from handeye.types import Camera, Charuco, Target
+from handeye.types import AprilGrid, Camera, Charuco, Chessboard, CircleGrid, Target
 
 CAMERA = Camera("brown_conrady_4", [900, 905, 320, 240, -0.1, 0.01, 1e-3, 2e-3], 640, 480, np.eye(8) * 0.01)
 TARGET = Charuco(5, 7, 0.03, 0.02, "DICT_4X4_50")
@@ -66,6 +66,38 @@ def test_target(tmp_path: Path) -> None:
     assert read_target(written(tmp_path / "a.toml", fields)) == TARGET
     assert read_target(written(tmp_path / "b.toml", f"[target]\n{fields}")) == TARGET
     assert read_target(written(tmp_path / "c.json", json.dumps(TARGET.to_dict()))) == TARGET
+
+
+# The examples of Kalibr's wiki, "Calibration targets".
+APRILGRID = "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\n"
+CHECKERBOARD = "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: 0.06\ncolSpacingMeters: 0.06\n"
+CIRCLES = (
+    "target_type: 'circlegrid'\ntargetCols: 6\ntargetRows: 7\nspacingMeters: 0.02\nasymmetricGrid: False\n"
+)
+
+
+def test_targets_of_kalibr(tmp_path: Path) -> None:
+    assert read_target(written(tmp_path / "april_6x6.yaml", APRILGRID)) == AprilGrid(6, 6, 0.088, 0.3)
+    assert read_target(written(tmp_path / "b.yaml", CHECKERBOARD)) == Chessboard(7, 6, 0.06)
+    assert read_target(written(tmp_path / "c.yml", CIRCLES)) == CircleGrid(7, 6, 0.02, 0.008)
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("a: [", "not YAML"),
+        ("target_type: wall", "expected aprilgrid"),
+        (APRILGRID.replace("tagSize: 0.088", "tagSize: big"), "tagSize"),
+        (APRILGRID.replace("tagSize: 0.088\n", ""), "tagSize is missing"),
+        (CHECKERBOARD.replace("colSpacingMeters: 0.06", "colSpacingMeters: 0.05"), "equal sides"),
+        (APRILGRID.replace("tagCols: 6", "tagCols: 99999999999"), "columns"),
+    ],
+)
+def test_damaged_targets_of_kalibr(text: str, match: str, tmp_path: Path) -> None:
+    path = written(tmp_path / "a.yaml", text)
+    with pytest.raises(InputError, match=match) as caught:
+        read_target(path)
+    assert str(path) in caught.value.message
 
 
 @pytest.mark.parametrize(

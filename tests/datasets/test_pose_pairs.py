@@ -29,12 +29,17 @@ def transform(pose: Pose, indent: str) -> str:
     )
 
 
-def easy_samples(mounting: Mounting, kind: str = "") -> str:
-    """As easy_handeye2 writes them: its parameters empty, `robot` the other way round beside the robot."""
+def easy_samples(mounting: Mounting, kind: str = "", wrong: int = 0) -> str:
+    """As easy_handeye2 writes them: its parameters empty, `robot` the other way round beside the robot.
+
+    The target of the first `wrong` samples is that of the last.
+    """
     parts = [
         f"parameters:\n  name: ''\n  calibration_type: '{kind}'\n  freehand_robot_movement: false\nsamples:\n"
     ]
-    for pose, seen in stations(mounting):
+    listed = stations(mounting)
+    for index, (pose, right) in enumerate(listed):
+        seen = listed[-1][1] if index < wrong else right
         robot = pose if mounting is Mounting.EYE_IN_HAND else pose.inverse()
         parts.append(f"- robot:\n{transform(robot, '    ')}  tracking:\n{transform(seen, '    ')}")
     return "".join(parts)

@@ -1,5 +1,7 @@
 """Everything wrong at once, on the path that a user takes: regions hold the truth, pixels count once."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -87,3 +89,31 @@ def test_endings_are_computed() -> None:
     calibration = calibrate(Measurements.of_recording(simulate(ErrorKind.MIXTURE_CELL, 1)))
     assert calibration.ending == "converged_average"
     assert 1 <= calibration.iterations <= 8
+
+
+def test_points_that_are_stated_as_worse_weigh_less() -> None:
+    """A third of the corners blurred: what the detector says of them is worth knowing, and scale is none of it."""
+    random = np.random.default_rng(5)
+    errors: dict[str, list[float]] = {"stated": [], "scaled": [], "unstated": []}
+    holds = 0
+    for number in range(12):
+        cell = simulate(ErrorKind.PIXEL_ONLY, number, CellOptions(pixel_sigma_px=(0.02, 0.02)), seed=12)
+        views, stated, scaled = [], [], []
+        for view in cell.views:
+            sigmas = np.where(random.random(len(view)) < 1 / 3, 0.3, 0.02)
+            pixels = view.pixels + np.sqrt(sigmas**2 - 0.02**2)[:, None] * random.standard_normal(
+                (len(view), 2)
+            )
+            views.append(replace(view, pixels=pixels))
+            stated.append(replace(view, pixels=pixels, sigmas_px=sigmas))
+            scaled.append(replace(view, pixels=pixels, sigmas_px=3 * sigmas))
+        for name, some in (("stated", stated), ("scaled", scaled), ("unstated", views)):
+            recording = replace(cell, views=tuple(some))
+            estimate = estimated(recording)
+            assert recording.truth is not None
+            assert recording.truth.X is not None
+            errors[name].append(metrics.absolute_error(estimate.X, recording.truth.X).translation_mm)
+            holds += name == "stated" and held(recording, estimate)
+    assert np.mean(errors["stated"]) < 0.6 * np.mean(errors["unstated"])
+    assert np.mean(errors["scaled"]) == pytest.approx(np.mean(errors["stated"]), rel=0.1)
+    assert holds >= 10

@@ -1,10 +1,13 @@
 """The samples of MoveIt Calibration."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import yaml
 
 from cells import Cell
+from handeye.datasets import PosePairs, load
 from handeye.errors import InputError
 from handeye.export import moveit_samples
 from handeye.types import Pose, Recording, View
@@ -35,3 +38,13 @@ def test_no_usable_view_is_an_error() -> None:
     few = View(view.name, view.T_base_flange, view.point_ids[:3], view.pixels[:3])
     with pytest.raises(InputError, match="no view"):
         moveit_samples(whole.with_views([few]))
+
+
+def test_samples_are_read_back(tmp_path: Path) -> None:
+    made = recording(6)
+    path = tmp_path / "samples.yaml"
+    path.write_text(moveit_samples(made))
+    found = load(path)
+    assert isinstance(found, PosePairs)
+    for pair, view in zip(found.pairs, made.views, strict=True):
+        assert np.abs(pair.T_base_flange.matrix - view.T_base_flange.matrix).max() < 1e-9

@@ -120,7 +120,10 @@ def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
     path = tmp_path / "demo.samples"
     path.write_text(easy_samples(Mounting.EYE_IN_HAND))
     answer = handeye.json("solve", path, "--mounting", "eye_in_hand")
-    compare("handeye solve, poses alone", answer)
+    # One sample says what another has seen.
+    path.write_text(easy_samples(Mounting.EYE_IN_HAND, wrong=1))
+    one_out = handeye.json("solve", path, "--mounting", "eye_in_hand")
+    compare("handeye solve, poses alone", answer, one_out)
 
 
 def test_demo_of_a_folder(handeye: Handeye, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -141,6 +144,10 @@ def test_plan(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     )
 
 
+def test_expect(handeye: Handeye) -> None:
+    compare("handeye expect", handeye.json("expect", "--views", "4", "--cells", "1"))
+
+
 def test_validate(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     without_truth = made_recording(8)
     object.__setattr__(without_truth, "truth", None)
@@ -157,6 +164,10 @@ def test_export(handeye: Handeye, shipped: Path) -> None:
         handeye.json("export", shipped, "--format", "urdf"),
         handeye.json("export", shipped, "--format", "moveit_samples"),
     )
+
+
+def test_devices(handeye: Handeye) -> None:
+    compare("handeye devices", handeye.json("devices"))
 
 
 def test_target(handeye: Handeye, tmp_path: Path) -> None:
@@ -187,9 +198,11 @@ def test_demo_of_a_cell(handeye: Handeye, tmp_path: Path) -> None:
 
 def test_run(handeye: Handeye, tmp_path: Path) -> None:
     session = handeye.json("run", "--session", tmp_path / "cell", "--points-only", "0.1", "--seed", "5")
+    unknown = ("--uncalibrated", "--points-only", "0.1", "--max-views", "6")
+    learnt = handeye.json("run", "--session", tmp_path / "learnt", *unknown)
     # Its keys are those of solve.
-    session["calibration"] = None
-    compare("handeye run", session, handeye.json("run", "--dry-run"))
+    session["calibration"] = learnt["calibration"] = None
+    compare("handeye run", session, learnt, handeye.json("run", "--dry-run"))
 
 
 @pytest.mark.parametrize("study", ["table1", "curves", "holdout", "injected"])
@@ -212,6 +225,8 @@ def test_twin(handeye: Handeye) -> None:
 def test_simulated_studies(handeye: Handeye) -> None:
     data = handeye.json("study", "methods", "--trials", "1", "--workers", "1")
     compare("handeye study methods", data)
+    scale = handeye.json("study", "scale", "--trials", "40", "--workers", "1", "--no-cluster")
+    compare("handeye study scale", scale)
     few = ("--trials", "1", "--workers", "1")
     compare("handeye study policies", handeye.json("study", "policies", "--budgets", "5", *few))
     one_step = ("--candidates", "3", "--draws", "2", "--arm", "exact")

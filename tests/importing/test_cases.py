@@ -9,6 +9,7 @@ import pytest
 from handeye.datasets import Statement, read_camera
 from handeye.errors import InputError, UnstatedError
 from handeye.estimation import solve
+from handeye.estimation.confidence import within
 from handeye.importing import SourceOptions, open_folder
 from handeye.notations import NOTATIONS, Unit
 from handeye.types import Charuco
@@ -89,3 +90,37 @@ def test_camera_of_another_size() -> None:
 def test_poses_four_decimals(tmp_path: Path) -> None:
     folder = shutil.copytree(CASES / "poses_four_decimals" / "round_4", tmp_path / "round_4")
     assert position_mm(folder) == pytest.approx([-70, 10, 60], abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("case", "code"),
+    [
+        ("angles_negated/neg_in_0_20_1_signs_negated", None),
+        ("mirrored_camera/mir_in_6_0", None),
+        ("gimbal_inverted/gimbal2_inv", None),
+        ("euler_conventions/conv_in_12_35_signs_negated", None),
+        ("euler_conventions/conv_in_12_35_ur_rotvec_as_rpy", None),
+        ("euler_conventions/conv_in_8_14_kuka_abc_as_rpy", None),
+        ("stale_robot_poses/stale_pairs", "v00 and v01, v02 and v03"),
+        ("stale_robot_poses/stale_all", "the pose was not read again"),
+    ],
+)
+def test_what_is_wrong_throughout_is_never_answered(case: str, code: str | None) -> None:
+    with pytest.raises(InputError, match=code or "."):
+        position_mm(CASES / case)
+
+
+def test_zero_distortion_as_pinhole() -> None:
+    folder = CASES / "zero_distortion_as_pinhole"
+    for name in ("zero5_D455_pinhole", "zero5_D455_five"):
+        assert position_mm(folder / name) == pytest.approx([-70, 10, 60], abs=0.5)
+
+
+def test_eye_to_hand_mix() -> None:
+    recording = open_folder(CASES / "eye_to_hand_mix").recording
+    calibration = solve(recording)
+    assert recording.truth is not None
+    truth = recording.mounting.results(recording.truth.X, recording.truth.Y)["T_base_camera"]
+    off = calibration.results["T_base_camera"].translation - truth.translation
+    known = within(calibration.covariance, calibration.degrees_of_freedom)
+    assert 1e3 * float((off**2).sum() ** 0.5) < known.translation_mm

@@ -1,13 +1,17 @@
 """Folders of pictures and pose lists: read, matched, and where nothing is said, told by the pictures."""
 
+import json
 import shutil
 from pathlib import Path
+from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from commands import Handeye
 from folders import PICTURE_BOARD, PICTURE_CAMERA, photographed
 from handeye.datasets import Statement, read_pose_rows
+from handeye.datasets.joint_states import read_joint_rows
 from handeye.datasets.toml_text import toml_text
 from handeye.errors import InputError, UnstatedError
 from handeye.estimation import solve
@@ -144,3 +148,47 @@ def test_a_camera_of_another_size_is_refused(folder: Path, pictures: tuple[Path,
     options = SourceOptions(stated=Statement(NOTATIONS["ur"], Unit.MM))
     with pytest.raises(InputError, match=r"1280 x 960 pixels, the pictures in .* have 640 x 480"):
         open_folder(folder, options)
+
+
+class MadeUpArm:
+    """Turns positions of its one joint, a number, into poses."""
+
+    joint_names = ("b", "a")
+
+    def __init__(self, poses: list[Pose]) -> None:
+        self.poses = poses
+
+    def forward(self, joints: np.ndarray) -> np.ndarray:
+        return np.array([self.poses[round(row[0])].matrix for row in joints])
+
+
+def test_joint_states_of_moveit_in_place_of_poses(
+    folder: Path, pictures: tuple[Path, Pose, list[Pose]]
+) -> None:
+    states = {"joint_names": ["a", "gripper", "b"], "joint_values": [[0.5, 0.0, k] for k in range(8)]}
+    (folder / "joint_states.yaml").write_text(json.dumps(states))
+    with pytest.raises(InputError, match="joint positions in place of poses") as caught:
+        open_folder(folder)
+    assert "--robot" in str(caught.value.hint)
+    arm: Any = MadeUpArm(pictures[2])
+    opened = open_folder(folder, SourceOptions(camera=PICTURE_CAMERA, arm=arm))
+    for k, view in enumerate(opened.recording.views):
+        assert view.joints_rad == (k, 0.5)
+        assert view.T_base_flange == pictures[2][k]
+
+
+@pytest.mark.parametrize(
+    ("states", "match"),
+    [
+        ({"joint_names": ["a"], "joint_values": [[1]]}, "joints a, expected b, a"),
+        ({"joint_names": ["a", "b"], "joint_values": [[1, 2], [1]]}, "sample 2: 1 values, expected 2"),
+        ({"joint_names": ["a", "b"], "joint_values": [[1, "x"]]}, "sample 1"),
+        ({"joint_names": ["a", "b"], "joint_values": []}, "joint_values: expected a list"),
+        ({"joint_names": ["a", "b"], "joint_values": [[1, 1e999]]}, "finite"),
+    ],
+)
+def test_damaged_joint_states(states: dict[str, Any], match: str, tmp_path: Path) -> None:
+    path = tmp_path / "states.json"
+    path.write_text(json.dumps(states))
+    with pytest.raises(InputError, match=match):
+        read_joint_rows(path, cast("Any", MadeUpArm([])))

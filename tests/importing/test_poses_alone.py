@@ -38,6 +38,41 @@ def test_noise_shows_in_the_misfit(mounting: Mounting) -> None:
     assert np.median(errors) < 2e-3
 
 
+@pytest.mark.parametrize("mounting", Mounting)
+def test_the_stated_radius_holds(mounting: Mounting) -> None:
+    held = []
+    for seed in range(12):
+        solved = solve_poses(noisy(mounting, 1e-3, seed=seed))
+        off = 1e3 * float(np.linalg.norm((X @ solved.X.inverse()).log()[:3]))
+        held.append(off <= solved.within_95.translation_mm)
+        assert 0.1 < solved.within_95.translation_mm < 20
+    assert np.mean(held) > 0.8
+
+
+def test_a_detector_that_does_not_see_depth_is_found() -> None:
+    rng = np.random.default_rng(3)
+    poses = []
+    for pose, seen in stations(Mounting.EYE_IN_HAND, 30):
+        matrix = seen.matrix.copy()
+        matrix[:3, 3] *= 1 + rng.normal(0, 4e-3) / np.linalg.norm(matrix[:3, 3])
+        poses.append((pose, Pose(matrix)))
+    levels = solve_poses(PosePairs("deep", "test", Mounting.EYE_IN_HAND, numbered(poses))).levels
+    assert 2e-3 < levels["detector_along_m"] < 8e-3
+    assert levels["detector_across_m"] < 0.5e-3
+
+
+@pytest.mark.parametrize("wrong", [1, 3])
+def test_samples_that_contradict_the_others_are_left_out(wrong: int) -> None:
+    good = noisy(Mounting.EYE_IN_HAND, 2e-4)
+    poses = [(pair.T_base_flange, pair.T_camera_target) for pair in good.pairs]
+    for k in range(wrong):
+        pose, seen = poses[3 * k]
+        poses[3 * k] = pose, Pose.exp([0.03, 0, 0.05, 0.1, 0, 0]) @ seen
+    solved = solve_poses(PosePairs("wrong", "test", good.mounting, numbered(poses)))
+    assert list(solved.left_out) == [f"sample_{3 * k + 1:02d}" for k in range(wrong)]
+    assert np.linalg.norm((X @ solved.X.inverse()).log()[:3]) < 2e-3
+
+
 def test_what_cannot_be_solved_is_refused() -> None:
     good = noisy(Mounting.EYE_IN_HAND, 0.0)
     with pytest.raises(InputError, match="at least 3"):
@@ -52,12 +87,13 @@ def test_what_cannot_be_solved_is_refused() -> None:
         solve_poses(PosePairs("slid", "test", good.mounting, numbered(slid)))
 
 
-def test_the_command_answers_and_says_what_it_lacks(tmp_path: Path, handeye: Handeye) -> None:
+def test_the_command_answers_and_says_what_poses_do_not_show(tmp_path: Path, handeye: Handeye) -> None:
     path = tmp_path / "demo.samples"
     path.write_text(easy_samples(Mounting.EYE_TO_HAND))
     answer = handeye.json("solve", str(path), "--mounting", "eye_to_hand")
     assert np.abs(np.array(answer["T_base_camera"]) - X.inverse().matrix).max() < 1e-4
-    assert "no accuracy can be stated" in answer["warnings"][-1]
+    assert answer["within_95"]["translation_mm"] < 0.5
+    assert "shows in none of them" in answer["warnings"][-1]
     with pytest.raises(InputError, match="without pictures"):
         open_folder_of_samples(tmp_path)
     assert json.dumps(answer)

@@ -79,6 +79,39 @@ def test_a_last_line_without_its_line_feed_is_whole(session: Path) -> None:
     assert (session / "journal.jsonl").read_bytes() == content
 
 
+@pytest.mark.parametrize(
+    "torn",
+    [
+        lambda line: line[: len(line) // 2],
+        lambda line: line[: len(line) // 2] + bytes(len(line) - len(line) // 2 - 1) + b"\n",
+        lambda line: bytes(len(line)),
+        lambda line: bytes(60) + line[60:],
+    ],
+)
+def test_a_torn_last_line_is_left_out_and_said(session: Path, torn: Callable[[bytes], bytes]) -> None:
+    store = open_session(session)
+    assert store.notice is None
+    store.close()
+    whole, lines = Outcome.of(session), lines_of(session)
+    # As after a crash: the recording is never ahead of the journal.
+    view = json.loads(lines[-1])["view"]["name"]
+    (session / "corners" / f"{view}.csv").unlink()
+    (session / "recording.toml").unlink()
+    last = torn(lines[-1])
+    write(session, [*lines[:-1], last])
+    store = open_session(session)
+    assert len(store.entries) == len(lines) - 1
+    assert store.notice is not None
+    assert f"({len(last)} bytes)" in store.notice
+    store.close()
+    run(configured(3), session)
+    assert Outcome.of(session) == whole
+    # Not the last line: that was no crash.
+    write(session, [*lines[:-2], torn(lines[-2]), lines[-1]])
+    with pytest.raises(InputError, match=r"does not fit its checksum|no attempt in the journal took"):
+        open_session(session)
+
+
 def test_changed_bytes_are_refused(session: Path) -> None:
     content = (session / "journal.jsonl").read_bytes()
     random = np.random.default_rng(2)

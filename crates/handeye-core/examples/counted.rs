@@ -120,7 +120,8 @@ fn count_score(repeats: usize, points: u32, distorted: bool, noisy: bool, unit: 
     };
     let execution = Execution { unit, threads: 1 };
     for _ in 0..repeats {
-        let gains = model.gains_by(&belief, &Entropy, Motions::Matrices(black_box(&motions)), &execution);
+        let gains =
+            model.gains_by(&belief, &Entropy, Motions::Matrices(black_box(&motions)), None, &execution);
         black_box(gains.expect("rigid motions"));
     }
 }

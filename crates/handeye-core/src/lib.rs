@@ -10,6 +10,7 @@ pub mod error;
 pub mod estimation;
 pub mod imaging;
 pub mod information;
+pub mod interrupt;
 pub mod kinematics;
 pub mod least_squares;
 pub mod planar_pose;

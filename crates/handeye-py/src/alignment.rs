@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::call::CallCore;
 use handeye_core::imaging::alignment::Alignment as CoreAlignment;
 use handeye_core::imaging::plane_map::PlaneMap as CoreMap;
 use handeye_core::imaging::printed::Printed as CorePrinted;
@@ -121,7 +122,7 @@ impl Printed {
         }
         let image = picture(py, &image)?;
         let found =
-            py.detach(|| CoreAlignment::of(&self.inner, &image, &plane, &pixels, margin_px, also_negative));
+            py.core(|| CoreAlignment::of(&self.inner, &image, &plane, &pixels, margin_px, also_negative))?;
         Ok(found.map(|inner| Alignment { inner }))
     }
 

@@ -1,5 +1,6 @@
 //! Projection and its inverse, batched.
 
+use crate::call::CallCore;
 use handeye_core::camera::{Camera, Feature, Lens, ParameterJacobian, Projection};
 use handeye_core::pose;
 use nalgebra::{Matrix2x3, SVector, Vector2, Vector3};
@@ -11,7 +12,7 @@ use crate::errors::{invalid, to_python};
 
 /// Registers the functions of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(lens_parameter_count, module)?)?;
+    module.add_function(wrap_pyfunction!(lenses, module)?)?;
     module.add_function(wrap_pyfunction!(project, module)?)?;
     module.add_function(wrap_pyfunction!(project_jacobians, module)?)?;
     module.add_function(wrap_pyfunction!(unproject, module)?)?;
@@ -54,8 +55,8 @@ pub fn features(py: Python<'_>, points: &Array<'_>, radii: &Array<'_>) -> PyResu
 }
 
 #[pyfunction]
-fn lens_parameter_count(py: Python<'_>, lens: &str) -> PyResult<usize> {
-    Lens::from_name(lens).map(Lens::parameter_count).map_err(|error| to_python(py, error))
+fn lenses() -> Vec<(&'static str, Vec<&'static str>)> {
+    Lens::ALL.iter().map(|lens| (lens.name(), lens.coefficients().to_vec())).collect()
 }
 
 #[pyfunction]
@@ -67,7 +68,7 @@ fn project<'py>(
 ) -> PyResult<(Floats<'py>, Flags<'py>)> {
     let camera = camera(py, lens, &parameters)?;
     let points = convert::vectors::<3>(py, "points_camera", &points_camera)?;
-    let pixels: Vec<_> = py.detach(|| points.iter().map(|p| camera.project(p)).collect());
+    let pixels: Vec<_> = py.core(|| points.iter().map(|p| camera.project(p)).collect())?;
     Ok(optional_out(py, &pixels, NAN_PIXEL))
 }
 
@@ -81,7 +82,7 @@ fn project_jacobians<'py>(
     let camera = camera(py, lens, &parameters)?;
     let points = convert::vectors::<3>(py, "points_camera", &points_camera)?;
     let projections: Vec<_> =
-        py.detach(|| points.iter().map(|p| camera.project_with_derivatives(p)).collect());
+        py.core(|| points.iter().map(|p| camera.project_with_derivatives(p)).collect())?;
     let unseen = Projection {
         pixel: NAN_PIXEL,
         d_point: Matrix2x3::repeat(f64::NAN),
@@ -109,7 +110,7 @@ fn unproject<'py>(
 ) -> PyResult<(Floats<'py>, Flags<'py>)> {
     let camera = camera(py, lens, &parameters)?;
     let pixels = convert::vectors::<2>(py, "uv", &uv)?;
-    let rays: Vec<_> = py.detach(|| pixels.iter().map(|p| camera.unproject(p)).collect());
+    let rays: Vec<_> = py.core(|| pixels.iter().map(|p| camera.unproject(p)).collect())?;
     Ok(optional_out(py, &rays, Vector3::repeat(f64::NAN)))
 }
 
@@ -126,7 +127,7 @@ fn project_features<'py>(
     let camera = camera(py, lens, &parameters)?;
     let transform = convert::transform(py, "T_camera_target", &T_camera_target)?;
     let features = features(py, &points, &radii)?;
-    let pixels: Vec<_> = py.detach(|| features.iter().map(|f| camera.observe(&transform, f)).collect());
+    let pixels: Vec<_> = py.core(|| features.iter().map(|f| camera.observe(&transform, f)).collect())?;
     Ok(optional_out(py, &pixels, NAN_PIXEL))
 }
 
@@ -146,7 +147,7 @@ fn refine_pose<'py>(
     let pixels = convert::vectors::<2>(py, "pixels", &pixels)?;
     let start = convert::transform(py, "T_camera_target", &T_camera_target)?;
     let fit = py
-        .detach(|| pose::refine_pose(&camera, &features, &pixels, &start))
+        .core(|| pose::refine_pose(&camera, &features, &pixels, &start))?
         .map_err(|error| to_python(py, error))?;
     Ok((
         convert::matrix_out(py, &fit.t_camera_target.to_matrix()),

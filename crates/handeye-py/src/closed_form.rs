@@ -1,5 +1,6 @@
 //! Closed-form starts.
 
+use crate::call::CallCore;
 use handeye_core::closed_form::{Method, solve};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -26,7 +27,7 @@ fn closed_form<'py>(
     let method = Method::from_name(method).map_err(|error| to_python(py, error))?;
     let a = convert::transforms(py, "A", &A)?;
     let c = convert::transforms(py, "C", &C)?;
-    let found = py.detach(|| solve(method, &a, &c)).map_err(|error| to_python(py, error))?;
+    let found = py.core(|| solve(method, &a, &c))?.map_err(|error| to_python(py, error))?;
     Ok((convert::matrix_out(py, &found.x.to_matrix()), convert::matrix_out(py, &found.y.to_matrix())))
 }
 

@@ -1,11 +1,12 @@
 //! Pose measurements of a cell, and the posterior of everything in it.
 
+use crate::call::CallCore;
 use handeye_core::estimation::{
     Assumptions, Body, CameraPrior, Cell, Measurement, Options, PoseMeasurement, Posterior as CorePosterior,
-    SeenBy, Station, WeakPrior, compress, estimate, shared_error, shrunk_variances, start_from_poses,
-    start_of_cell,
+    SeenBy, Station, WeakPrior, compress, estimate, relative_weights, shared_error, shrunk_variances,
+    start_from_poses, start_of_cell,
 };
-use handeye_core::least_squares::PixelParameters;
+use handeye_core::least_squares::{PixelParameters, Problem as CoreProblem};
 use handeye_core::se3::Se3;
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
@@ -53,7 +54,7 @@ fn start_from_poses_py<'py>(
     let covariances = convert::matrices::<6, 6>(py, "covariances", &covariances)?;
     let start = given(py, start)?;
     let found = py
-        .detach(|| start_from_poses(&motions, &poses, &covariances, &weak_prior(prior_sigma_m), start))
+        .core(|| start_from_poses(&motions, &poses, &covariances, &weak_prior(prior_sigma_m), start))?
         .map_err(|e| to_python(py, e))?;
     Ok((
         convert::matrix_out(py, &found.x.to_matrix()),
@@ -61,6 +62,32 @@ fn start_from_poses_py<'py>(
         found.cost,
         found.origin,
     ))
+}
+
+/// Weights of the points of each view by their deviations, where they are given.
+fn weights_of(
+    py: Python<'_>,
+    problem: &CoreProblem,
+    sigmas_px: &[Option<Array<'_>>],
+) -> PyResult<Vec<Option<Vec<f64>>>> {
+    if sigmas_px.len() != problem.view_count() {
+        return Err(invalid(py, "deviations of the points: one array, or None, for each view"));
+    }
+    sigmas_px
+        .iter()
+        .enumerate()
+        .map(|(k, sigmas)| {
+            let Some(sigmas) = sigmas else { return Ok(None) };
+            let sigmas = convert::scalars(py, "sigmas_px", sigmas)?;
+            if sigmas.len() != problem.point_count(k) || !sigmas.iter().all(|s| *s > 0.0 && s.is_finite()) {
+                return Err(invalid(
+                    py,
+                    &format!("view {k}: a deviation above zero for each point is needed"),
+                ));
+            }
+            Ok(Some(relative_weights(&sigmas)))
+        })
+        .collect()
 }
 
 /// Views of one target through one camera, each as a pose with its covariance.
@@ -72,13 +99,14 @@ pub struct PoseMeasurements {
 #[pymethods]
 impl PoseMeasurements {
     #[new]
-    #[pyo3(signature = (problem, poses, *, free_camera=None, board_scale=false))]
+    #[pyo3(signature = (problem, poses, *, free_camera=None, board_scale=false, sigmas_px=None))]
     fn new<'py>(
         py: Python<'py>,
         problem: &Problem,
         poses: Array<'py>,
         free_camera: Option<Vec<usize>>,
         board_scale: bool,
+        sigmas_px: Option<Vec<Option<Array<'py>>>>,
     ) -> PyResult<Self> {
         let poses = convert::transforms(py, "poses", &poses)?;
         let count = problem.inner.view_count();
@@ -92,18 +120,44 @@ impl PoseMeasurements {
         }
         let columns = free.len() + usize::from(board_scale);
         let parameters = (columns > 0).then_some(PixelParameters { camera: free, board_scale });
+        let weights = match sigmas_px {
+            None => vec![None; count],
+            Some(sigmas) => weights_of(py, &problem.inner, &sigmas)?,
+        };
         let views = py
-            .detach(|| {
+            .core(|| {
                 poses
                     .iter()
+                    .zip(&weights)
                     .enumerate()
-                    .map(|(k, pose)| {
-                        compress(&problem.inner, k, problem.inner.camera(), pose, parameters.as_ref())
+                    .map(|(k, (pose, weights))| {
+                        let (problem, weights) = (&problem.inner, weights.as_deref());
+                        compress(problem, k, problem.camera(), pose, parameters.as_ref(), weights)
                     })
                     .collect::<Result<Vec<_>, _>>()
-            })
+            })?
             .map_err(|e| to_python(py, e))?;
         Ok(Self { views })
+    }
+
+    /// Poses (K, 4, 4) that somebody else's detector states, with the covariance (K, 6, 6) of their left perturbation.
+    #[staticmethod]
+    fn stated<'py>(
+        py: Python<'py>,
+        motions: Array<'py>,
+        poses: Array<'py>,
+        covariances: Array<'py>,
+    ) -> PyResult<Self> {
+        let motions = convert::transforms(py, "motions", &motions)?;
+        let poses = convert::transforms(py, "poses", &poses)?;
+        let covariances = convert::matrices::<6, 6>(py, "covariances", &covariances)?;
+        if motions.len() != poses.len() || covariances.len() != poses.len() {
+            return Err(invalid(py, "as many motions and covariances as poses are needed"));
+        }
+        let each = motions.into_iter().zip(poses).zip(covariances);
+        let views =
+            each.map(|((motion, pose), covariance)| PoseMeasurement::stated(motion, pose, covariance));
+        Ok(Self { views: views.collect() })
     }
 
     fn __len__(&self) -> usize {
@@ -248,11 +302,11 @@ fn estimate_cell<'py>(
         .transpose()?;
     let options = Options { assumptions, weak: WeakPrior::default(), pairs, most_rounds };
     let (inner, origin) = py
-        .detach(|| {
+        .core(|| {
             let given = given.as_ref().map(|(x, y)| (x.as_slice(), y.as_slice()));
             let start = start_of_cell(&cell, &options.weak, given)?;
             Ok((estimate(&cell, (start.x, start.y), &options)?, start.origin))
-        })
+        })?
         .map_err(|e| to_python(py, e))?;
     Ok(Posterior { inner, origin })
 }

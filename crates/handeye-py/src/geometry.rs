@@ -1,5 +1,6 @@
 //! The group of rigid transforms, batched.
 
+use crate::call::CallCore;
 use handeye_core::se3::Se3;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -17,7 +18,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyfunction]
 fn se3_exp<'py>(py: Python<'py>, xi: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let twists = convert::vectors::<6>(py, "xi", &xi)?;
-    let transforms: Vec<Se3> = py.detach(|| twists.iter().map(Se3::exp).collect());
+    let transforms: Vec<Se3> = py.core(|| twists.iter().map(Se3::exp).collect())?;
     Ok(convert::transforms_out(py, &transforms))
 }
 
@@ -25,7 +26,7 @@ fn se3_exp<'py>(py: Python<'py>, xi: Array<'py>) -> PyResult<Bound<'py, PyArrayD
 #[expect(non_snake_case, reason = "the name in Python")]
 fn se3_log<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let transforms = convert::transforms(py, "T", &T)?;
-    let twists: Vec<_> = py.detach(|| transforms.iter().map(Se3::log).collect());
+    let twists: Vec<_> = py.core(|| transforms.iter().map(Se3::log).collect())?;
     Ok(convert::vectors_out(py, &twists))
 }
 
@@ -33,7 +34,7 @@ fn se3_log<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDy
 #[expect(non_snake_case, reason = "the name in Python")]
 fn se3_adjoint<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let transforms = convert::transforms(py, "T", &T)?;
-    let adjoints: Vec<_> = py.detach(|| transforms.iter().map(Se3::adjoint).collect());
+    let adjoints: Vec<_> = py.core(|| transforms.iter().map(Se3::adjoint).collect())?;
     Ok(convert::matrices_out(py, &adjoints))
 }
 

@@ -1,5 +1,6 @@
 //! Measuring in pictures.
 
+use crate::call::CallCore;
 use handeye_core::error::Error;
 use handeye_core::imaging::Picture;
 use handeye_core::imaging::corner::{Corner, CornerFitter, CornerGuess, CornerKind};
@@ -77,10 +78,10 @@ fn fit_corners<'py>(
         radius: radii[i],
         band: bands[i],
     });
-    let found: Vec<Option<Corner>> = py.detach(|| {
+    let found: Vec<Option<Corner>> = py.core(|| {
         let mut fitter = CornerFitter::new(picture, kind);
         guesses.map(|guess| fitter.fit(&guess, rough)).collect()
-    });
+    })?;
     let place = |c: &Option<Corner>| c.map_or([f64::NAN; 2], |c| c.place);
     let spread = |c: &Option<Corner>| c.map_or([[f64::NAN; 2]; 2], |c| c.spread).into_iter().flatten();
     Ok((
@@ -106,7 +107,7 @@ fn crossing_neighbours<'py>(
         .zip(&angles)
         .map(|(place, angles)| Crossing { place: (*place).into(), angles: (*angles).into() })
         .collect();
-    let found = py.detach(|| neighbours(&crossings, off));
+    let found = py.core(|| neighbours(&crossings, off))?;
     let number = |ray: Option<usize>| ray.and_then(|i| i64::try_from(i).ok()).unwrap_or(-1);
     Ok(Array2::from_shape_fn((found.len(), 4), |(i, k)| number(found[i][k])).into_pyarray(py))
 }
@@ -127,11 +128,11 @@ fn area_centroids<'py>(
     let n = centres.len();
     same_length(py, &[n, shapes.len(), gaps.len()])?;
     let picture = picture(py, &image)?;
-    let found: Vec<Option<Spot>> = py.detach(|| {
+    let found: Vec<Option<Spot>> = py.core(|| {
         (0..n)
             .map(|i| area_centroid(&picture, &Spot { centre: centres[i], shape: shapes[i] }, gaps[i]))
             .collect()
-    });
+    })?;
     let centre = |s: &Option<Spot>| s.map_or([f64::NAN; 2], |s| s.centre.into());
     let shape = |s: &Option<Spot>| {
         s.map_or([f64::NAN; 4], |s| [s.shape[(0, 0)], s.shape[(0, 1)], s.shape[(1, 0)], s.shape[(1, 1)]])

@@ -1,12 +1,12 @@
 //! Entropy, gains and predicted information of candidates.
 
+use crate::call::CallCore;
 use handeye_core::error::Error;
 use handeye_core::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, Task, ToolPoint, Trace,
 };
 use handeye_core::information::{
-    Belief as CoreBelief, CandidateJoints, CandidateModel, Execution, Motions, RobotError, Supposition,
-    Visibility,
+    ArmColumns, Belief as CoreBelief, CandidateModel, Execution, Motions, RobotError, Visibility,
 };
 use handeye_core::least_squares::PixelParameters;
 use handeye_core::simd::VectorUnit;
@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use crate::camera::{camera, features};
 use crate::convert::{self, Array};
 use crate::errors::{invalid, to_python};
-use crate::model::{jacobian_list, square};
+use crate::model::square;
 
 /// Registers the classes of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -151,10 +151,21 @@ fn vector_unit(py: Python<'_>, name: &str) -> PyResult<VectorUnit> {
         })
 }
 
-/// Weight, belief, and roots of the robot's error on the left and on the right.
-type Supposed<'py> = (f64, Bound<'py, Belief>, Option<Array<'py>>, Option<Array<'py>>);
 /// Roots `(N, 6, r)` of the noise of the joints, and columns `(N, 6, k)` of the arm's constants, per candidate.
 type ArmOfCandidates<'py> = (Array<'py>, Array<'py>);
+
+/// Matrices `(N, 6, m)` one after another, and m.
+fn columns<'a>(py: Python<'_>, array: &'a Array<'_>) -> PyResult<(std::borrow::Cow<'a, [f64]>, usize)> {
+    match *array.shape() {
+        [_, 6, count] => Ok((convert::in_place(array), count)),
+        _ => Err(invalid(py, "the arm of candidates must have shape (N, 6, m)")),
+    }
+}
+
+fn execution(py: Python<'_>, threads: usize, vector_unit: Option<&str>) -> PyResult<Execution> {
+    let unit = vector_unit.map_or_else(|| Ok(VectorUnit::widest()), |name| self::vector_unit(py, name))?;
+    Ok(Execution { unit, threads })
+}
 
 fn robot(py: Python<'_>, left: Option<&Array<'_>>, right: Option<&Array<'_>>) -> PyResult<RobotError> {
     let root = |name: &str, root: Option<&Array<'_>>| {
@@ -178,52 +189,23 @@ pub struct Predictor {
 }
 
 impl Predictor {
-    /// What the arm of each candidate does.
-    fn joints(
-        &self,
-        py: Python<'_>,
-        arm: Option<ArmOfCandidates<'_>>,
-        count: usize,
-    ) -> PyResult<Option<Vec<CandidateJoints>>> {
-        let Some((roots, constants)) = arm else { return Ok(None) };
-        let (roots, constants) = (jacobian_list(py, &roots)?, jacobian_list(py, &constants)?);
-        let fits = roots.len() == count
-            && constants.len() == count
-            && constants.iter().all(|c| c.ncols() == self.kinematic_count);
-        if !fits {
-            return Err(invalid(py, "the arm of candidates: as many as motions, with a column per constant"));
-        }
-        let joined = roots.into_iter().zip(constants);
-        Ok(Some(
-            joined
-                .map(|(root, constants)| CandidateJoints {
-                    constants,
-                    noise_root: (root.ncols() > 0).then_some(root),
-                })
-                .collect(),
-        ))
-    }
-
-    /// Gains in lanes; `threads` and `vector_unit` as Python gives them.
-    fn scored<'py>(
+    /// Has the motions and the arm of candidates looked at; a matrix that is no rigid transform is named.
+    fn looked<'py, T: Send>(
         &self,
         py: Python<'py>,
-        supposed: &[Supposition<'_>],
-        criterion: &PyCriterion,
         motions: &Array<'py>,
-        (threads, vector_unit): (usize, Option<&str>),
-    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let unit =
-            vector_unit.map_or_else(|| Ok(VectorUnit::widest()), |name| self::vector_unit(py, name))?;
+        arm: Option<&ArmOfCandidates<'py>>,
+        look: impl FnOnce(&CandidateModel<'_>, Motions<'_>, Option<ArmColumns<'_>>) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
         let matrices = convert::row_major::<4, 4>(py, "motions", motions)?;
         let matrices: &[f64] = &matrices;
-        let outcome = py.detach(|| {
-            let execution = Execution { unit, threads };
-            let criterion = criterion.inner.as_ref();
-            self.model().mean_gains(supposed, criterion, Motions::Matrices(matrices), &execution)
+        let noise = arm.map(|(noise, _)| columns(py, noise)).transpose()?;
+        let constants = arm.map(|(_, constants)| columns(py, constants)).transpose()?;
+        let arm = noise.as_ref().zip(constants.as_ref()).map(|((noise, of_noise), (constants, count))| {
+            ArmColumns { constants, noise, counts: (*count, *of_noise) }
         });
-        match outcome {
-            Ok(gains) => Ok(convert::scalars_out(py, gains)),
+        match py.core(|| look(&self.model(), Motions::Matrices(matrices), arm))? {
+            Ok(found) => Ok(found),
             Err(error @ Error::NotRigid { .. }) => {
                 // Once more, to say which.
                 convert::transforms(py, "motions", motions)?;
@@ -309,39 +291,18 @@ impl Predictor {
         threads: usize,
         vector_unit: Option<&str>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        if arm.is_some() {
-            let motions = convert::transforms(py, "motions", &motions)?;
-            let joints = self.joints(py, arm, motions.len())?.unwrap_or_default();
-            let criterion = criterion.inner.as_ref();
-            let gains = py
-                .detach(|| self.model().gains_with_joints(&belief.inner, criterion, &motions, &joints))
-                .map_err(|e| to_python(py, e))?;
-            return Ok(convert::scalars_out(py, gains));
-        }
-        let supposed = Supposition { weight: 1.0, belief: &belief.inner, robot: self.robot };
-        self.scored(py, &[supposed], criterion, &motions, (threads, vector_unit))
+        let execution = execution(py, threads, vector_unit)?;
+        let (belief, criterion) = (&belief.inner, criterion.inner.as_ref());
+        let gains = self.looked(py, &motions, arm.as_ref(), |model, motions, arm| {
+            model.gains_by(belief, criterion, motions, arm, &execution)
+        })?;
+        Ok(convert::scalars_out(py, gains))
     }
 
-    /// Gain of each candidate motion, averaged over what the robot's error may be, each with its weight, belief and
-    /// roots on both sides, in place of the predictor's own.
-    #[pyo3(signature = (supposed, criterion, motions, *, threads=0, vector_unit=None))]
-    fn mean_gains<'py>(
-        &self,
-        py: Python<'py>,
-        supposed: Vec<Supposed<'py>>,
-        criterion: &PyCriterion,
-        motions: Array<'py>,
-        threads: usize,
-        vector_unit: Option<&str>,
-    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let supposed = supposed
-            .iter()
-            .map(|(weight, belief, left, right)| {
-                let robot = robot(py, left.as_ref(), right.as_ref())?;
-                Ok(Supposition { weight: *weight, belief: &belief.get().inner, robot })
-            })
-            .collect::<PyResult<Vec<_>>>()?;
-        self.scored(py, &supposed, criterion, &motions, (threads, vector_unit))
+    /// Which candidate motions would show enough of the target.
+    fn in_sight<'py>(&self, py: Python<'py>, motions: Array<'py>) -> PyResult<Vec<bool>> {
+        let execution = Execution::default();
+        self.looked(py, &motions, None, |model, motions, _| model.in_sight(motions, &execution))
     }
 
     /// Information `(N, n, n)` of each candidate motion; zero where too little would be in sight.
@@ -352,21 +313,11 @@ impl Predictor {
         motions: Array<'py>,
         arm: Option<ArmOfCandidates<'py>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let motions = convert::transforms(py, "motions", &motions)?;
-        let joints = self.joints(py, arm, motions.len())?;
-        let model = self.model();
-        let n = model.parameter_count();
-        let all: Vec<DMatrix<f64>> = py.detach(|| {
-            motions
-                .iter()
-                .enumerate()
-                .map(|(i, motion)| {
-                    model
-                        .candidate(motion, joints.as_ref().map(|j| &j[i]))
-                        .map_or_else(|| DMatrix::zeros(n, n), |c| &c.factor * c.factor.transpose())
-                })
-                .collect()
-        });
+        let n = self.model().parameter_count();
+        let all = self.looked(py, &motions, arm.as_ref(), |model, motions, arm| {
+            let model: &CandidateModel<'_> = model;
+            model.informations(motions, arm)
+        })?;
         Ok(convert::dynamics_out(py, &all, n, n))
     }
 }

@@ -1,5 +1,6 @@
 //! Serial arms, batched.
 
+use crate::call::CallCore;
 use handeye_core::kinematics::{Chain as CoreChain, Frame, InverseOptions, Joint, JointKind};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -12,8 +13,13 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Chain>()
 }
 
-/// Poses between two looks at whether the user has interrupted: a pose out of reach takes about 8 ms.
-const SLICE: usize = 16;
+fn frame_of(py: Python<'_>, name: &str) -> PyResult<Frame> {
+    match name {
+        "base" => Ok(Frame::Base),
+        "flange" => Ok(Frame::Flange),
+        other => Err(invalid(py, &format!("frame must be base or flange, found \"{other}\""))),
+    }
+}
 
 /// A serial arm.
 #[pyclass(frozen, module = "handeye._core")]
@@ -78,10 +84,10 @@ impl Chain {
     fn forward<'py>(&self, py: Python<'py>, joints: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let (count, values) = self.configurations(py, &joints)?;
         let poses = py
-            .detach(|| {
+            .core(|| {
                 let mut poses = vec![0.0; count * 16];
                 self.inner.forward_all(&values, &mut poses).map(|()| poses)
-            })
+            })?
             .map_err(|e| to_python(py, e))?;
         Ok(convert::array(py, &[count, 4, 4], poses))
     }
@@ -93,22 +99,42 @@ impl Chain {
         joints: Array<'py>,
         frame: &str,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let frame = match frame {
-            "base" => Frame::Base,
-            "flange" => Frame::Flange,
-            other => {
-                return Err(invalid(py, &format!("frame must be base or flange, found \"{other}\"")));
-            }
-        };
+        let frame = frame_of(py, frame)?;
         let (count, values) = self.configurations(py, &joints)?;
         let n = self.inner.len();
         let jacobians = py
-            .detach(|| {
+            .core(|| {
                 let mut jacobians = vec![0.0; count * 6 * n];
                 self.inner.jacobian_all(frame, &values, &mut jacobians).map(|()| jacobians)
-            })
+            })?
             .map_err(|e| to_python(py, e))?;
         Ok(convert::array(py, &[count, 6, n], jacobians))
+    }
+
+    /// Twists `(N, 6, m)` of the flange at joints `(N, n)`, per way of displacing a joint on the link before it: `joint`
+    /// of each, and its twist `(m, 6)` in the joint's frame before it moves; in the frame "base" or "flange".
+    fn displacements<'py>(
+        &self,
+        py: Python<'py>,
+        joints: Array<'py>,
+        frame: &str,
+        which: Vec<usize>,
+        twists: Array<'py>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let frame = frame_of(py, frame)?;
+        let (count, values) = self.configurations(py, &joints)?;
+        let twists = convert::vectors::<6>(py, "twists", &twists)?;
+        if twists.len() != which.len() {
+            return Err(invalid(py, "as many joints as twists are needed"));
+        }
+        let ways: Vec<_> = which.into_iter().zip(twists).collect();
+        let found = py
+            .core(|| {
+                let mut found = vec![0.0; count * 6 * ways.len()];
+                self.inner.displacements_all(frame, &values, &ways, &mut found).map(|()| found)
+            })?
+            .map_err(|e| to_python(py, e))?;
+        Ok(convert::array(py, &[count, 6, ways.len()], found))
     }
 
     /// Joints `(N, n)` that reach poses `(N, 4, 4)`, which of them do, and how far off the others are (m, rad).
@@ -134,20 +160,17 @@ impl Chain {
         let mut joints = Vec::with_capacity(count * n);
         let mut reached = Vec::with_capacity(count);
         let mut off = Vec::with_capacity(count);
-        for (goals, starts) in goals.chunks(SLICE).zip(starts.chunks(SLICE * n)) {
-            py.detach(|| {
-                for (goal, start) in goals.iter().zip(starts.chunks_exact(n)) {
-                    let (q, found, how_far) = match self.inner.inverse(goal, start, &options) {
-                        Ok(reach) => (reach.joints, true, (0.0, 0.0)),
-                        Err(nearest) => (nearest.joints, false, (nearest.off_m, nearest.off_rad)),
-                    };
-                    joints.extend(q);
-                    reached.push(found);
-                    off.push(how_far);
-                }
-            });
-            py.check_signals()?;
-        }
+        py.core(|| {
+            for (goal, start) in goals.iter().zip(starts.chunks_exact(n)) {
+                let (q, found, how_far) = match self.inner.inverse(goal, start, &options) {
+                    Ok(reach) => (reach.joints, true, (0.0, 0.0)),
+                    Err(nearest) => (nearest.joints, false, (nearest.off_m, nearest.off_rad)),
+                };
+                joints.extend(q);
+                reached.push(found);
+                off.push(how_far);
+            }
+        })?;
         Ok((convert::array(py, &[count, n], joints), reached, off))
     }
 
@@ -164,7 +187,7 @@ impl Chain {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let goal = convert::transform(py, "goal", &goal)?;
         let options = InverseOptions { tolerance_m, tolerance_rad, steps, attempts };
-        let found = py.detach(|| self.inner.inverse_all(&goal, &options));
+        let found = py.core(|| self.inner.inverse_all(&goal, &options))?;
         Ok(convert::array(py, &[found.len(), self.inner.len()], found.concat()))
     }
 }

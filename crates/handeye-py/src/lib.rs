@@ -7,6 +7,7 @@
 use pyo3::prelude::*;
 
 mod alignment;
+mod call;
 mod camera;
 mod closed_form;
 mod convert;

@@ -1,5 +1,6 @@
 //! The pose of a planar target in one image.
 
+use crate::call::CallCore;
 use handeye_core::planar_pose::planar_pose as core_planar_pose;
 use handeye_core::pose::PoseFit;
 use numpy::PyArrayDyn;
@@ -36,6 +37,6 @@ fn planar_pose<'py>(
     let camera = camera(py, lens, &parameters)?;
     let features = features(py, &points, &radii)?;
     let pixels = convert::vectors::<2>(py, "pixels", &pixels)?;
-    let pose = py.detach(|| core_planar_pose(&camera, &features, &pixels)).map_err(|e| to_python(py, e))?;
+    let pose = py.core(|| core_planar_pose(&camera, &features, &pixels))?.map_err(|e| to_python(py, e))?;
     Ok((fit_out(py, &pose.best), pose.mirrored.as_ref().map(|m| fit_out(py, m))))
 }

@@ -1,5 +1,6 @@
 //! Several views at once, and the bound on any choice.
 
+use crate::call::CallCore;
 use handeye_core::planning::{Objective, certify as core_certify, select as core_select};
 use nalgebra::DMatrix;
 use pyo3::prelude::*;
@@ -55,7 +56,7 @@ fn select_views<'py>(
     let base = square(py, "base", &base)?;
     let pool = pool(py, &informations)?;
     let objective = self::objective(py, objective, tool_points)?;
-    let chosen = py.detach(|| core_select(&base, &pool, k, &objective)).map_err(|e| to_python(py, e))?;
+    let chosen = py.core(|| core_select(&base, &pool, k, &objective))?.map_err(|e| to_python(py, e))?;
     Ok((chosen.indices, chosen.value))
 }
 
@@ -78,13 +79,13 @@ fn certify_views<'py>(
         return Err(invalid(py, &format!("chosen view {i} of {}", pool.len())));
     }
     let objective = self::objective(py, objective, tool_points)?;
-    py.detach(|| {
+    py.core(|| {
         let certificate =
             core_certify(&base, &pool, chosen.len(), &objective, &chosen, iterations, tolerance)?;
         let total = chosen.iter().fold(base.clone(), |sum, i| sum + &pool[*i]);
         let value = objective.value(&total).unwrap_or(f64::NAN);
         let efficiency = objective.efficiency(value, certificate.bound, base.nrows());
         Ok((value, certificate.bound, efficiency))
-    })
+    })?
     .map_err(|e| to_python(py, e))
 }

@@ -1,5 +1,6 @@
 //! Measurements and their solution, as Python values.
 
+use crate::call::CallCore;
 use handeye_core::error::Error;
 use handeye_core::least_squares::{
     Options, Problem as CoreProblem, Solution as CoreSolution, Start, solve, view_block,
@@ -79,7 +80,7 @@ impl Problem {
         let start = Start { x: convert::transform(py, "x", &x)?, y: convert::transform(py, "y", &y)? };
         let options = Options { max_iterations, cost_tolerance, step_tolerance, gradient_tolerance };
         let inner =
-            py.detach(|| solve(&self.inner, &model.inner, &start, &options)).map_err(|e| to_python(py, e))?;
+            py.core(|| solve(&self.inner, &model.inner, &start, &options))?.map_err(|e| to_python(py, e))?;
         Ok(Solution { inner })
     }
 
@@ -97,16 +98,16 @@ impl Problem {
         if let Some(k) = views.iter().find(|k| **k >= self.inner.view_count()) {
             return Err(invalid(py, &format!("view {k} of {}", self.inner.view_count())));
         }
-        Ok(py.detach(|| {
+        py.core(|| {
             views
                 .iter()
                 .map(|k| {
                     let pose = x * *self.inner.motion(*k) * y;
-                    view_block(&self.inner, *k, self.inner.camera(), &pose, 1.0, None)
+                    view_block(&self.inner, *k, self.inner.camera(), &pose, 1.0, None, None)
                         .map_or(f64::INFINITY, |b| b.squared_px)
                 })
                 .sum()
-        }))
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! Evidence of sets of views, as a Python value.
 
+use crate::call::CallCore;
 use handeye_core::estimation::{LinearisedView, NoiseLevel, ViewSets as CoreViewSets};
 use handeye_core::least_squares::Side;
 use nalgebra::DVector;
@@ -82,7 +83,7 @@ impl ViewSets {
             .zip(translation.iter().zip(&*rotation))
             .map(|(left, (t, r))| NoiseLevel { side: side(*left), translation_m: *t, rotation_rad: *r })
             .collect();
-        let fit = py.detach(|| self.inner.fit(&levels, &members.0)).map_err(|e| to_python(py, e))?;
+        let fit = py.core(|| self.inner.fit(&levels, &members.0))?.map_err(|e| to_python(py, e))?;
         let (n, count) = (self.inner.size(), levels.len());
         Ok((
             convert::array(py, &[count, n, n], fit.covariances),

@@ -69,6 +69,21 @@ def _score(found: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _default(found: Mapping[str, Any]) -> list[str]:
+    rows = [
+        [name.replace("_", " "), *(_number(case[f"{what}_us"] / 1e3) for what in ("median", "low", "high"))]
+        for name, case in found["cases"].items()
+    ]
+    return [
+        "## The default model",
+        (
+            "Milliseconds, median and quartiles. Estimates are of simulated cells with all errors at once; "
+            "solving is all that `handeye solve` does with the shipped recording after its corners are found."
+        ),
+        _table(["what", "median", "low", "high"], rows),
+    ]
+
+
 def _step(found: Mapping[str, Any]) -> list[str]:
     cases = found["cases"]
     stages = list(next(iter(cases.values()))["stages"])
@@ -143,6 +158,7 @@ def _scaling(found: Mapping[str, Any]) -> list[str]:
 
 _PARTS: dict[str, Callable[[Mapping[str, Any]], list[str]]] = {
     "solve": _solve,
+    "default": _default,
     "score": _score,
     "step": _step,
     "loop": _loop,

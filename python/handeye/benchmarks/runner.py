@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from handeye.benchmarks.default import bench_default
 from handeye.benchmarks.loop import bench_loop
 from handeye.benchmarks.machine import describe_machine, describe_versions, one_core
 from handeye.benchmarks.memory import bench_memory
@@ -16,6 +17,7 @@ from handeye.compute.parallel import Progress
 
 BENCHMARKS: Mapping[str, Callable[[Options, Progress], dict[str, Any]]] = {
     "solve": bench_solve,
+    "default": bench_default,
     "score": bench_score,
     "step": bench_step,
     "loop": bench_loop,

@@ -17,6 +17,7 @@ from handeye.benchmarks.timing import interleave
 from handeye.compute.parallel import Progress
 from handeye.estimation import Estimate, Measurements, make_estimator
 from handeye.planning.prediction import Prediction, Sight
+from handeye.robots import ArmKinematics
 from handeye.simulation.cells import CellOptions, ErrorKind, simulate, simulated_arm
 from handeye.types import Camera, Recording, View
 from handeye.types.arrays import FloatArray
@@ -28,10 +29,12 @@ CANDIDATES = 10_000
 SPREAD_RAD = 0.15
 CERTIFIED_OF = 100
 CERTIFIED = 3
+# Model, lens, and whether the arm is described.
 CASES = {
-    "exact_robot": (ModelName.PAPER, "pinhole"),
-    "noise_aware": (ModelName.AUTO, "pinhole"),
-    "noise_aware_distortion": (ModelName.AUTO, "brown_conrady_5"),
+    "exact_robot": (ModelName.PAPER, "pinhole", False),
+    "noise_aware": (ModelName.AUTO, "pinhole", False),
+    "noise_aware_distortion": (ModelName.AUTO, "brown_conrady_5", False),
+    "arm_described_distortion": (ModelName.AUTO, "brown_conrady_5", True),
 }
 
 
@@ -48,23 +51,23 @@ class _Step:
 
 
 def bench_step(options: Options, progress: Progress) -> dict[str, Any]:
-    """Return the times of the stages of a step and their sum, for three models."""
+    """Return the times of the stages of a step and their sum, for each model."""
     cases: dict[str, Any] = {}
-    for done, (name, (model, lens)) in enumerate(CASES.items()):
+    for done, (name, (model, lens, described)) in enumerate(CASES.items()):
         progress(done, len(CASES))
         count = 200 if options.quick else CANDIDATES
         cases[name] = {"model": model.value, "lens": lens, "views": VIEWS, "candidates": count} | _case(
-            model, lens, count, options
+            model, lens, described, count, options
         )
     progress(len(CASES), len(CASES))
     return {"cases": cases}
 
 
-def _case(model: ModelName, lens: str, count: int, options: Options) -> dict[str, Any]:
+def _case(model: ModelName, lens: str, described: bool, count: int, options: Options) -> dict[str, Any]:
     recording = simulate(ErrorKind.WHITE_FLANGE, 0, CellOptions(views=(VIEWS, VIEWS)), seed=options.seed)
     if lens == "pinhole":
         recording = _without_distortion(recording, options.seed)
-    estimator = make_estimator(model)
+    estimator = make_estimator(model, ArmKinematics(simulated_arm()) if described else None)
     seven = Measurements.of_recording(replace(recording, views=recording.views[:-1]))
     before = estimator(seven)
     measurements = seven.with_views(recording.views[-1:])
@@ -73,12 +76,12 @@ def _case(model: ModelName, lens: str, count: int, options: Options) -> dict[str
     postures = np.array([view.joints_rad for view in recording.views])
     joints = postures[random.integers(0, VIEWS, count)] + SPREAD_RAD * random.standard_normal((count, 6))
     motions = _motions(joints)
-    step = _Step(measurements, before, estimate, joints, motions, _gains(estimate, motions))
+    step = _Step(measurements, before, estimate, joints, motions, _gains(estimate, motions, joints))
     stages: dict[str, Callable[[], object]] = {
         "pose_of_view": lambda: seven.with_views(recording.views[-1:]),
         "estimate": lambda: estimator(measurements, before),
         "kinematics": lambda: _motions(joints),
-        "gains": lambda: _gains(estimate, motions),
+        "gains": lambda: _gains(estimate, motions, joints),
         "certificate": lambda: _certify(step),
     }
     budget = 0.0 if options.quick else max(options.budget_s, 1.0)
@@ -119,13 +122,13 @@ def _motions(joints: FloatArray) -> FloatArray:
     return motions
 
 
-def _gains(estimate: Estimate, motions: FloatArray) -> FloatArray:
-    return Prediction(estimate, Sight()).gains(_core.Criterion("entropy"), motions)
+def _gains(estimate: Estimate, motions: FloatArray, joints: FloatArray) -> FloatArray:
+    return Prediction(estimate, Sight()).gains(_core.Criterion("entropy"), motions, joints)
 
 
 def _certify(step: _Step) -> tuple[float, float, float]:
     prediction = Prediction(step.estimate, Sight())
     best = np.argsort(-np.nan_to_num(step.gains, nan=-np.inf), kind="stable")[:CERTIFIED_OF]
-    informations = prediction.informations(step.motions[best])
+    informations = prediction.informations(step.motions[best], step.joints[best])
     chosen, _ = _core.select_views(step.estimate.information, informations, CERTIFIED, "entropy")
     return _core.certify_views(step.estimate.information, informations, chosen, "entropy")

@@ -15,7 +15,7 @@ from handeye.cli.progress import progress
 if TYPE_CHECKING:
     from rich.console import Console
 
-Name = Literal["solve", "score", "step", "loop", "memory", "scaling"]
+Name = Literal["solve", "default", "score", "step", "loop", "memory", "scaling"]
 
 
 def bench(
@@ -27,7 +27,7 @@ def bench(
     output: Path | None = None,
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
-    """Measure solver, scorer, a planning step and a step of the loop, side by side with their peers.
+    """Measure solver, default model, scorer, planning and a step of the loop, side by side with peers.
 
     All methods get the same problems and take turns in one run. Peers that are not installed are left out,
     and it is said why; requirements/bench.txt brings SciPy, JAX, Ceres and GTSAM for Python and the headers
@@ -37,7 +37,7 @@ def bench(
     Parameters
     ----------
     names
-        What to measure: solve, score, step, loop, memory, scaling; all of them by default.
+        What to measure: solve, default, score, step, loop, memory, scaling; all of them by default.
     budget_s
         Seconds for each method at each size.
     no_peers

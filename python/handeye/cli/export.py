@@ -12,10 +12,13 @@ from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output
+from handeye.cli.solve_poses import ONLY_POSES
 from handeye.cli.source import Source
+from handeye.datasets import PosePairs
 from handeye.datasets.writing import replace_file
 from handeye.estimation import solve
 from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text, moveit_samples, read_result
+from handeye.importing import PosesSolved, solve_poses
 from handeye.types import Pose
 from handeye.types.calibration import ModelName
 
@@ -137,9 +140,26 @@ def export(
 
 
 def _solved(folder: Path, source: Source, model: ModelName, *, reduced: bool) -> Result:
-    opened = source.open(folder)
+    opened = source.open_any(folder)
+    if isinstance(opened, PosePairs):
+        return _of_poses(solve_poses(opened))
     calibration = solve(opened.recording, model, reduced=reduced)
     return Result.of(calibration, opened.recording.name, map(str, opened.warnings))
+
+
+def _of_poses(solved: PosesSolved) -> Result:
+    camera, target = solved.results.values()
+    warnings = (*map(str, solved.pairs.warnings), ONLY_POSES)
+    count = len(solved.pairs) - len(solved.left_out)
+    return Result(
+        solved.pairs.mounting,
+        camera,
+        target,
+        solved.covariance,
+        recording=solved.pairs.name,
+        view_count=count,
+        warnings=warnings,
+    )
 
 
 def _answer(

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
+from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_new_folder
 from handeye.cli.source import Source
@@ -45,6 +46,11 @@ def import_folder(
     if is_rig(folder):
         return _import_rig(source.open_rig(folder), destination, images=images)
     opened = source.open(folder, arm.described())
+    if images and all(view.image is None for view in opened.recording.views):
+        raise UsageError(
+            f"--images: the pictures of {folder} are in no files of their own",
+            hint="leave it out: the recording has their points, and solves without them",
+        )
     write_recording(opened.recording, destination, images_from=opened.folder if images else None)
     check_written(opened.recording, destination)
     data = _data(opened, destination)

@@ -17,8 +17,8 @@ from handeye.session import End, Session, SessionStore
 from handeye.session.drivers import MANUAL, Person
 
 if TYPE_CHECKING:
-    from handeye.session.configuration import Prepared
     from handeye.session.deciding import Considered
+    from handeye.session.prepared import Prepared
     from handeye.ui import Server
 
 # How the formats that a folder is watched for begin.

@@ -1,7 +1,6 @@
 """`handeye run`: drive the arm from view to view until the accuracy asked for is reached."""
 
 import sys
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,11 +13,10 @@ from handeye.cli.failures import UsageError
 from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder
 from handeye.cli.page import Live, Page
-from handeye.cli.run_options import Limits, Simulated, Timeouts
-from handeye.cli.session_report import report_of_session
+from handeye.cli.run_answer import judged_by, run_answer
+from handeye.cli.run_options import Lens, Limits, Simulated, Timeouts
 from handeye.cli.work import WorkOptions, check_touch
 from handeye.datasets import read_camera, read_target
-from handeye.errors import DetectionError, DeviceError, HandeyeError
 from handeye.estimation import Estimate
 from handeye.notations import SHOWN
 from handeye.planning.collisions import Body
@@ -26,13 +24,14 @@ from handeye.planning.constraints import ViewLimits
 from handeye.robots import open_arm
 from handeye.robots.manual import describe
 from handeye.robots.protocol import Goal
-from handeye.session.configuration import Prepared, begin, go_on, prepare
-from handeye.session.deciding import START_VIEWS, EndReason
+from handeye.session.configuration import begin, go_on, prepare
+from handeye.session.deciding import START_VIEWS
 from handeye.session.drivers import REPLAY, Person
 from handeye.session.entry import Entry
 from handeye.session.journal import read_settings
 from handeye.session.loop import End, Session
 from handeye.session.observer import Observer
+from handeye.session.prepared import Prepared
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore
@@ -69,6 +68,7 @@ def run(
     limits: Limits = Limits(),  # noqa: B008 - frozen, like those below
     work: WorkOptions = WorkOptions(),  # noqa: B008
     timeouts: Timeouts = Timeouts(),  # noqa: B008
+    unknown: Lens = Lens(),  # noqa: B008
     simulated: Simulated = Simulated(),  # noqa: B008
     page: Page = Page(),  # noqa: B008
     common: Common = Common(),  # noqa: B008
@@ -95,7 +95,7 @@ def run(
     target
         Target in TOML or JSON; the simulated one is a chessboard.
     camera
-        Calibrated camera in TOML, JSON or ROS's camera_info .yaml.
+        Calibrated camera in TOML, JSON or ROS's camera_info .yaml. Without one the views teach the lens too.
     mounting
         Where the camera sits; in the hand, if nothing is said.
     accuracy_mm
@@ -163,6 +163,9 @@ def run(
             limits.margin_px,
         ),
         patience=timeouts.patience(driver, images),
+        camera_known=not (unknown.uncalibrated and driver == SIMULATED),
+        lens=unknown.lens,
+        accuracy_px=unknown.accuracy_px,
         simulation=simulated.simulation(),
         touch_mm=touch_mm,
         work=work.work(),
@@ -186,7 +189,7 @@ def run(
     if session is None:
         return _plan(prepared)
     loop, store = begin(prepared, session)
-    return _answer(session, configuration, prepared, _driven(loop, store, prepared, front))
+    return run_answer(session, configuration, prepared, _driven(loop, store, prepared, front))
 
 
 class _Front:
@@ -222,7 +225,9 @@ def _resumed(session: Path, confirm: bool | None, page: Page, *, as_json: bool) 
     loop, store, prepared = go_on(
         session, person=front.person, confirm=front.confirm, observer=front.observer
     )
-    return _answer(session, configuration, prepared, _driven(loop, store, prepared, front))
+    if store.notice is not None:
+        front.person.tell(f"warning: {store.notice}")
+    return run_answer(session, configuration, prepared, _driven(loop, store, prepared, front))
 
 
 def _described(robot: str) -> str:
@@ -303,7 +308,7 @@ def _plan(prepared: Prepared) -> Answer:
         "arm": prepared.arm.name,
         "workspace_mm": [(MM_PER_M * space.lower_m).tolist(), (MM_PER_M * space.upper_m).tolist()],
         "speed_deg_s": float(np.rad2deg(wish.speed_rad_s)),
-        "collisions_judged": _judged_by(prepared),
+        "collisions_judged": judged_by(prepared),
         "accuracy_mm": wish.accuracy_mm,
         "accuracy_deg": wish.accuracy_deg,
         "most_views": wish.most_views,
@@ -332,90 +337,3 @@ def _plan(prepared: Prepared) -> Answer:
             console.print(describe(known, SHOWN, prepared.arm.sliding), soft_wrap=True)
 
     return Answer(data, show)
-
-
-def _answer(folder: Path, configuration: Configuration, prepared: Prepared, end: End) -> Answer:
-    hint = f"handeye run --resume --session {folder} goes on"
-    report = None if end.calibration is None else _report(folder, configuration.model)
-    if end.reason in {EndReason.TOO_MANY_FAILURES, EndReason.ROBOT_HANGS}:
-        raise DeviceError(end.sentence, code=end.reason, hint=hint)
-    if end.reason is EndReason.NO_START:
-        raise DetectionError(end.sentence, code=end.reason, hint=hint)
-    calibration = end.calibration
-    if calibration is None:
-        raise HandeyeError(
-            f"{end.sentence}; the views do not determine the answer", code=end.reason, hint=hint
-        )
-    error: Mapping[str, float] | None = None
-    if prepared.truth is not None and prepared.truth.X is not None:
-        off = (calibration.X @ prepared.truth.X.inverse()).log()
-        error = {
-            "translation_mm": MM_PER_M * float(np.linalg.norm(off[:3])),
-            "rotation_deg": float(np.rad2deg(np.linalg.norm(off[3:]))),
-        }
-    data: dict[str, Any] = {
-        "session": str(folder),
-        "report": None if report is None else str(report),
-        "end": end.reason.value,
-        "sentence": end.sentence,
-        "request_met": end.reason is EndReason.ACCURACY_REACHED,
-        "views": end.views,
-        "attempts": end.attempts,
-        "within_95": None if end.reach is None else end.reach.to_dict(),
-        "true_error": error,
-        "collisions_judged": _judged_by(prepared),
-        "seed": configuration.seed,
-        "calibration": calibration.to_dict(),
-    }
-    return Answer(data, lambda console: _show(console, data, end, error))
-
-
-def _judged_by(prepared: Prepared) -> str:
-    if prepared.configuration.is_replay:
-        return "none: recorded views, nothing moved"
-    if prepared.cell.solids is None:
-        return "by capsules along the links"
-    return "by the shapes of the links in the description"
-
-
-def _report(folder: Path, model: ModelName) -> Path | None:
-    report, trouble = report_of_session(folder, model)
-    if trouble:
-        print(f"warning: {trouble}", file=sys.stderr, flush=True)
-    return report
-
-
-def _show(console: "Console", data: Mapping[str, Any], end: End, error: Mapping[str, float] | None) -> None:
-    from handeye.cli.wording import heading, notices, pairs, pose_lines  # noqa: PLC0415
-
-    calibration = end.calibration
-    if calibration is None:
-        return
-    met = "accuracy reached" if data["request_met"] else "accuracy NOT reached"
-    heading(console, met, end.sentence)
-    name = calibration.mounting.result_names[0]
-    console.print()
-    heading(console, name)
-    pairs(console, pose_lines(calibration.results[name]), indent=2)
-    console.print()
-    rows = [("views", f"{end.views} of {end.attempts} attempts"), ("collisions", data["collisions_judged"])]
-    if end.reach is not None:
-        rows.append(
-            (
-                "predicted",
-                f"within {end.reach.translation_mm:.3f} mm and {end.reach.rotation_deg:.4f} deg (95 %)",
-            )
-        )
-    if error is not None:
-        rows.append(
-            (
-                "truth",
-                f"off by {error['translation_mm']:.3f} mm and {error['rotation_deg']:.4f} deg",
-            )
-        )
-    rows.append(("written", data["session"]))
-    if data["report"] is not None:
-        rows.append(("report", data["report"]))
-    pairs(console, rows)
-    notices(console, "Warnings", calibration.warnings)
-    notices(console, "Diagnosis", (finding.sentence for finding in calibration.diagnosis), "cyan")

@@ -1,6 +1,7 @@
 """Groups of options of `handeye run`: limits of motion, time-outs, and what is wrong in a simulated cell."""
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from cyclopts import Parameter
 
@@ -59,6 +60,20 @@ class Timeouts:
             "grab_s": self.camera_timeout_s,
         }
         return replace(usual, **{name: value for name, value in stated.items() if value is not None})
+
+
+@Parameter(name="*", group="A camera that is not calibrated")
+@dataclass(frozen=True)
+class Lens:
+    """Without --camera the views teach the lens too: how well, and which."""
+
+    accuracy_px: float = 1.0
+    """Pixels shall lie within so much of where they belong, root mean square over the image, with 95 %
+    probability."""
+    lens: Literal["brown_conrady_5", "kannala_brandt"] | None = None
+    """Of which kind it is, kannala_brandt for a fisheye; by default the views tell."""
+    uncalibrated: bool = False
+    """Begin a simulated cell without its camera's calibration."""
 
 
 @Parameter(name="*", group="Simulated cell")

@@ -37,6 +37,14 @@ study.command(
     "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
 )
 study.command(
+    "handeye.cli.study_public:public", name="public", help="Compare on cells and data that others made."
+)
+study.command(
+    "handeye.cli.study_scale:scale",
+    name="scale",
+    help="Measure what a million trials cost here and on a cluster.",
+)
+study.command(
     "handeye.cli.study_methods:methods",
     name="methods",
     help="Compare every method on the same simulated cells.",

@@ -74,7 +74,7 @@ def gains(
 ) -> Answer:
     """Correlate predicted gains with what candidates bring in expectation, and in single draws.
 
-    Every candidate of a first step is taken many times in a twin of the cell, all noise drawn anew, and the
+    Every candidate of a first step is taken many times in a twin of the cell, all noise drawn again, and the
     reduction of the error against the truth, and of the RMSE on held-out views, is averaged.
 
     Parameters

@@ -29,7 +29,7 @@ def show_policies(
     console: Console, parts: Mapping[str, Mapping[str, Any]], metrics: Sequence[tuple[str, str]]
 ) -> None:
     """Print mean and median of each metric: a block per set, a row per policy."""
-    table = _table("")
+    table = plain_table("")
     for _, unit in metrics:
         table.add_column(f"mean ({unit})", justify="right")
         table.add_column("median", justify="right")
@@ -42,7 +42,8 @@ def show_policies(
     console.print(table)
 
 
-def _table(first: str) -> Table:
+def plain_table(first: str) -> Table:
+    """Return a table without lines but under its head, and its first column."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column(first, no_wrap=True)
     return table
@@ -68,7 +69,7 @@ def show_halves(console: Console, parts: Mapping[str, Mapping[str, Any]]) -> Non
 def show_curves(console: Console, name: str, part: Mapping[str, Any]) -> None:
     """Print the means after each added view."""
     heading(console, name)
-    table = _table("")
+    table = plain_table("")
     policies = part["policies"]
     first = next(iter(policies.values()))
     for i in range(len(first["entropy_nats"])):
@@ -85,7 +86,7 @@ def show_curves(console: Console, name: str, part: Mapping[str, Any]) -> None:
 
 def show_kinds(console: Console, kinds: Mapping[str, Mapping[str, Any]]) -> None:
     """Print coverage and NEES of each kind of error."""
-    table = _table("kind of error")
+    table = plain_table("kind of error")
     for title in ("in 95 % region", "NEES / 6", "error (mm)", "claimed", "trials"):
         table.add_column(title, justify="right")
     for kind, found in kinds.items():
@@ -102,7 +103,7 @@ def show_kinds(console: Console, kinds: Mapping[str, Mapping[str, Any]]) -> None
 
 def show_mistakes(console: Console, document: Mapping[str, Any]) -> None:
     """Print how many of each mistake were named, and the error against that without the mistake."""
-    table = _table("mistake")
+    table = plain_table("mistake")
     for title in ("named", "answered", "error (mm)", "without it", "trials"):
         table.add_column(title, justify="right")
     for kind, found in [*document["kinds"].items(), ("all", document["planted"])]:

@@ -6,7 +6,7 @@ a `Recording`, ready to be solved.
 
 from handeye.datasets.camera_files import read_camera, read_cameras
 from handeye.datasets.image_set import ImageSet, ImportOptions, Shot, UnreadPoses
-from handeye.datasets.importer import Importer
+from handeye.datasets.importer import Imported, Importer
 from handeye.datasets.loading import IMPORTERS, load
 from handeye.datasets.parameter_files import read_target
 from handeye.datasets.plausibility import DataWarning, recording_warnings
@@ -23,6 +23,7 @@ __all__ = [
     "DataWarning",
     "ImageSet",
     "ImportOptions",
+    "Imported",
     "Importer",
     "LoadedRecording",
     "LoadedRig",

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from handeye.datasets.image_header import image_size
 from handeye.datasets.images import read_image
+from handeye.datasets.joint_states import Forward
 from handeye.datasets.plausibility import DataWarning
 from handeye.datasets.pose_rows import NOTHING_STATED, PoseRows, Reading, Statement
 from handeye.datasets.reading import inside
@@ -176,6 +177,8 @@ class ImportOptions:
         File or folder with the robot's poses, where several fit or none is found.
     stated
         How these poses are written, as far as it is said.
+    arm
+        What turns joint positions into poses, where a file has these in their place.
     """
 
     target: Target | None = None
@@ -183,6 +186,7 @@ class ImportOptions:
     mounting: Mounting | None = None
     poses: str | None = None
     stated: Statement = NOTHING_STATED
+    arm: Forward | None = None
 
 
 def common_image_size(folder: Path, shots: Iterable[Shot]) -> tuple[int, int] | None:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from handeye.datasets.bags.contents import Contents
 from handeye.datasets.image_set import ImageSet, ImportOptions, UnreadPoses
-from handeye.datasets.pose_pairs import PosePairs
+from handeye.datasets.pose_pairs import PosePairs, PoseStreams
 
-Imported = ImageSet | UnreadPoses | PosePairs | Contents
+Imported = ImageSet | UnreadPoses | PosePairs | PoseStreams | Contents
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,12 @@ import os
 from pathlib import Path
 
 from handeye.datasets import (
+    certifiable,
     easy_handeye2,
     industrial_calibration,
     moveit_samples,
     pose_list,
+    pose_streams,
     recording_format,
     robot_cal_tools,
     rwhe_calib,
@@ -16,6 +18,7 @@ from handeye.datasets import (
 from handeye.datasets.bags import importer as bags
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Imported, Importer
+from handeye.datasets.joint_states import Forward
 from handeye.datasets.pose_rows import NOTHING_STATED, Statement
 from handeye.datasets.reading import existing_folder, is_file
 from handeye.datasets.recording_format import LoadedRecording
@@ -32,6 +35,10 @@ IMPORTERS: dict[str, Importer] = {
         easy_handeye2.IMPORTER,
         moveit_samples.IMPORTER,
         visp.IMPORTER,
+        pose_streams.ETHZ,
+        pose_streams.KINHEC,
+        pose_streams.TUM,
+        certifiable.IMPORTER,
         bags.IMPORTER,
         pose_list.IMPORTER,
     )
@@ -50,6 +57,7 @@ def load(
     mounting: Mounting | None = None,
     poses: str | None = None,
     stated: Statement | None = None,
+    arm: Forward | None = None,
 ) -> LoadedRecording | Imported:
     """Read a folder: a recording of ours, or images and poses in a layout of others.
 
@@ -59,22 +67,22 @@ def load(
         The folder, or the file in it that tells the layout (such as `recording.toml`).
     layout
         Name of one of `IMPORTERS`; None to recognise it.
-    target, pattern, mounting, poses, stated
+    target, pattern, mounting, poses, stated, arm
         What the files of others leave open, see `ImportOptions`; a recording leaves nothing open.
 
     Returns
     -------
-    LoadedRecording, ImageSet, UnreadPoses, PosePairs or Contents
+    LoadedRecording, ImageSet, UnreadPoses, PosePairs, PoseStreams or Contents
         An `ImageSet` has no points yet: they are still to be detected; of `UnreadPoses` not even the robot's
-        poses are known; `PosePairs` never had pictures; of the `Contents` of a bag it is still to be chosen
-        what counts.
+        poses are known; `PosePairs` and `PoseStreams` never had pictures; of the `Contents` of a bag it is
+        still to be chosen what counts.
 
     Raises
     ------
     InputError
         Nothing that can be read, or not what it claims to be.
     """
-    options = ImportOptions(target, pattern, mounting, poses, stated or NOTHING_STATED)
+    options = ImportOptions(target, pattern, mounting, poses, stated or NOTHING_STATED, arm)
     folder = _place(path)
     if layout is not None:
         importer = IMPORTERS.get(layout)
@@ -84,7 +92,7 @@ def load(
             )
         return importer.read(folder, options)
     if is_file(folder / FILE_NAME):
-        if options != ImportOptions():
+        if options != ImportOptions(arm=arm):
             raise InputError(
                 f"{folder}: a recording says its target, mounting and poses itself",
                 code="options_unused",

@@ -24,6 +24,7 @@ from handeye.datasets.camera_files import read_camera
 from handeye.datasets.image_header import IMAGE_SUFFIXES
 from handeye.datasets.image_set import ImageSet, ImportOptions, Shot, UnreadPoses, common_image_size
 from handeye.datasets.importer import Importer
+from handeye.datasets.joint_states import read_joint_rows
 from handeye.datasets.parameter_files import read_target
 from handeye.datasets.plausibility import DataWarning, camera_warnings, pose_warnings, target_warnings
 from handeye.datasets.pose_files import read_pose_rows
@@ -33,7 +34,10 @@ from handeye.errors import InputError
 from handeye.types import Camera, Mounting, Pose, Target
 
 POSE_SUFFIXES = frozenset({".csv", ".tsv", ".txt", ".json", ".yaml", ".yml", ".xml", ".dat", ".tum"})
-_TARGET = re.compile(r"(board|target|.*_board|.*_target)\.(toml|json)", re.IGNORECASE)
+_TARGET = re.compile(
+    r"(board|target|.*_board|.*_target)\.(toml|json|ya?ml)|(april|checkerboard|circlegrid).*\.ya?ml",
+    re.IGNORECASE,
+)
 _CAMERA = re.compile(
     r"(camera.*|cam0?|ost|.*intrinsics?.*|calibration|camchain.*)\.(toml|json|ya?ml|xml|txt)", re.IGNORECASE
 )
@@ -70,7 +74,7 @@ def read(folder: Path, options: ImportOptions) -> ImageSet | UnreadPoses:
     readings = rows.readings(options.stated)
     known = len(readings) == 1
     poses = rows.poses(readings[0]) if known else (Pose.identity(),) * len(rows)
-    shots = _shots(folder, [picture for _, picture in chosen], poses)
+    shots = _shots(folder, [picture for _, picture in chosen], poses, rows)
     size = common_image_size(folder, shots)
     target = stated_target(folder, options)
     camera, camera_notes = _camera(folder)
@@ -114,7 +118,7 @@ def _rows(folder: Path, pictures: Sequence[str], options: ImportOptions) -> tupl
         path = _given(folder, options.poses)
         if path.is_dir():
             return _one_a_file(path, [path / name for name in _candidates(path)]), options.poses
-        return read_pose_rows(path), options.poses
+        return _read_rows(path, options), options.poses
     names = _candidates(folder)
     if not names:
         raise InputError(
@@ -128,8 +132,10 @@ def _rows(folder: Path, pictures: Sequence[str], options: ImportOptions) -> tupl
     failures: list[str] = []
     for name in names[:_MAX_OPENED]:
         try:
-            found[name] = read_pose_rows(folder / name)
+            found[name] = _read_rows(folder / name, options)
         except InputError as error:
+            if error.code in {"unknown_arm", "wrong_arm"}:
+                raise
             failures.append(error.message)
     if len(found) > 1:
         fitting = {name: rows for name, rows in found.items() if len(rows) == len(pictures)}
@@ -146,6 +152,11 @@ def _rows(folder: Path, pictures: Sequence[str], options: ImportOptions) -> tupl
         )
     (name, rows), *_ = found.items()
     return rows, name
+
+
+def _read_rows(path: Path, options: ImportOptions) -> PoseRows:
+    joints = read_joint_rows(path, options.arm)
+    return read_pose_rows(path) if joints is None else joints
 
 
 def _given(folder: Path, name: str) -> Path:
@@ -251,12 +262,13 @@ def _left_out(pictures: Sequence[str], rows: PoseRows, pairs: Sequence[tuple[int
     return warnings
 
 
-def _shots(folder: Path, pictures: Sequence[str], poses: Sequence[Pose]) -> tuple[Shot, ...]:
+def _shots(folder: Path, pictures: Sequence[str], poses: Sequence[Pose], rows: PoseRows) -> tuple[Shot, ...]:
     names = [re.sub(r"[^A-Za-z0-9_.-]", "_", Path(picture).stem)[:80] for picture in pictures]
     if len({name.lower() for name in names}) < len(names):
         names = [f"{index:03d}_{name}" for index, name in enumerate(names)]
     with located(str(folder)):
-        return tuple(Shot(*triple) for triple in zip(names, pictures, poses, strict=True))
+        joints = [None] * len(rows) if rows.joints is None else [tuple(row) for row in rows.joints.tolist()]
+        return tuple(Shot(*parts) for parts in zip(names, pictures, poses, joints, strict=True))
 
 
 def stated_target(folder: Path, options: ImportOptions) -> Target:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handeye.datasets.bags.tracks import Track
 from handeye.datasets.plausibility import DataWarning
 from handeye.errors import InputError
 from handeye.types import Mounting, Pose
@@ -86,3 +87,30 @@ def numbered(poses: Sequence[tuple[Pose, Pose]]) -> tuple[PosePair, ...]:
     """Return stations named by their place, counted from one."""
     width = max(2, len(str(len(poses))))
     return tuple(PosePair(f"sample_{k:0{width}d}", *pair) for k, pair in enumerate(poses, start=1))
+
+
+@dataclass(frozen=True, eq=False)
+class PoseStreams:
+    """Robot and target over time.
+
+    Attributes
+    ----------
+    name, layout, source
+        As those of `PosePairs`.
+    mounting
+        Where the camera sits; None if nothing says so.
+    robot
+        `T_base_flange` over time, with joints where they are known.
+    seen
+        The other stream: `T_camera_target`, or its inverse.
+    may_be_inverse
+        Whether the files leave open which of the two.
+    """
+
+    name: str
+    layout: str
+    source: str
+    mounting: Mounting | None
+    robot: Track
+    seen: Track
+    may_be_inverse: bool = False

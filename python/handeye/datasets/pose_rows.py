@@ -108,6 +108,8 @@ class PoseRows:
         Whether the file says that its angles are in degrees or radians; None if it does not.
     has_time
         Whether a column of times was left out.
+    joints
+        (N, n) joint positions of each row, radians; None where they are not known.
     """
 
     file: Path
@@ -118,6 +120,7 @@ class PoseRows:
     stated: Statement = field(default_factory=Statement)
     degrees: bool | None = None
     has_time: bool = False
+    joints: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -129,6 +132,7 @@ class PoseRows:
             names=tuple(self.names[i] for i in kept),
             values=self.values[list(kept)],
             places=tuple(self.places[i] for i in kept),
+            joints=None if self.joints is None else self.joints[list(kept)],
         )
 
     def matrices(self, reading: Reading) -> FloatArray:

@@ -26,8 +26,8 @@ from handeye.datasets.reading import existing_folder, inside, located
 from handeye.datasets.recording_format import Rows, keep_image, write_recording
 from handeye.datasets.recording_header import FILE_NAME, FORMAT, RIG_VERSION, read_versioned
 from handeye.datasets.toml_text import toml_text
-from handeye.datasets.writing import new_folder, write_file
-from handeye.errors import InputError
+from handeye.datasets.writing import new_folder, replace_file, write_file
+from handeye.errors import InputError, OutputError
 from handeye.types import (
     Body,
     Camera,
@@ -156,22 +156,53 @@ def write_rig(
     source = None if images_from is None else Path(images_from)
     with new_folder(Path(folder)) as partial:
         (partial / "corners").mkdir()
-        views: list[dict[str, Any]] = []
-        for station in recording.stations:
-            for one in station.views:
-                stem = f"{station.name}.{one.camera}.{one.target}"
-                corners = f"corners/{stem}.csv"
-                write_file(partial / corners, corners_text(one.view).encode())
-                views.append(
-                    without_none(
-                        station=station.name,
-                        camera=one.camera,
-                        target=one.target,
-                        image=keep_image(one.view, partial, source, stem),
-                        corners=corners,
-                    )
-                )
+        views = [
+            _write_view(station, one, partial, source)
+            for station in recording.stations
+            for one in station.views
+        ]
         write_file(partial / FILE_NAME, _text(recording, views))
+
+
+def append_station(recording: RigRecording, folder: Path) -> None:
+    """Add the last station to a recording that holds all before it; a reader finds it whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        The system refuses to write.
+    """
+    *before, last = recording.stations
+    tables = [_table(station, one, None) for station in before for one in station.views]
+    try:
+        (folder / "corners").mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written ({error})") from error
+    for one in last.views:
+        # Where a run was killed between the two, the file is there already.
+        replace_file(folder / _corners(last, one), corners_text(one.view).encode())
+        tables.append(_table(last, one, None))
+    replace_file(folder / FILE_NAME, _text(recording, tables))
+
+
+def _corners(station: Station, one: CameraView) -> str:
+    return f"corners/{station.name}.{one.camera}.{one.target}.csv"
+
+
+def _table(station: Station, one: CameraView, image: str | None) -> dict[str, Any]:
+    return without_none(
+        station=station.name,
+        camera=one.camera,
+        target=one.target,
+        image=image,
+        corners=_corners(station, one),
+    )
+
+
+def _write_view(station: Station, one: CameraView, folder: Path, images_from: Path | None) -> dict[str, Any]:
+    write_file(folder / _corners(station, one), corners_text(one.view).encode())
+    stem = f"{station.name}.{one.camera}.{one.target}"
+    return _table(station, one, keep_image(one.view, folder, images_from, stem))
 
 
 def _named(tables: list[dict[str, Any]], what: str) -> list[tuple[str, Body, dict[str, Any]]]:

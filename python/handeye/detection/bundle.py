@@ -29,6 +29,8 @@ class Bundle:
         (N, 3), (N,), (N, 2) features of the target, metres, and where they were found; view by view.
     counts
         (K,) number of features of each view.
+    prior
+        Belief about the parameters besides what was measured; None for none.
     """
 
     lens: str
@@ -38,6 +40,15 @@ class Bundle:
     radii: FloatArray
     pixels: FloatArray
     counts: NDArray[np.int64]
+    prior: "ParameterPrior | None" = None
+
+    def cost(self, residuals: FloatArray) -> float:
+        """Return the sum of squared residuals, with that of the prior."""
+        squares = float((residuals**2).sum())
+        if self.prior is None:
+            return squares
+        off = self.parameters - self.prior.mean
+        return squares + float(off**2 @ self.prior.weights)
 
     def residuals(self) -> FloatArray | None:
         """Return measured minus predicted pixels (N, 2); None if a feature is out of the lens's sight."""
@@ -68,6 +79,9 @@ class Bundle:
             blocks.V[k] = G.T @ G
             blocks.g[:] += F.T @ r
             blocks.h[k] = G.T @ r
+        if self.prior is not None:
+            blocks.U[:] += np.diag(self.prior.weights)
+            blocks.g[:] += self.prior.weights * (self.prior.mean - self.parameters)
         return blocks
 
     def moved(self, step: FloatArray, twists: FloatArray) -> "Bundle":
@@ -101,6 +115,23 @@ class Bundle:
     def _parts(self) -> list[slice]:
         ends = np.cumsum(self.counts)
         return [slice(int(end - count), int(end)) for end, count in zip(ends, self.counts, strict=True)]
+
+
+@dataclass(frozen=True)
+class ParameterPrior:
+    """A Gaussian belief about the parameters of a lens, each for itself.
+
+    Attributes
+    ----------
+    mean
+        (n,) where it is centred.
+    weights
+        (n,) inverse variances in units of the pixel noise, px^2 over the square of the parameter's unit; zero
+        where nothing is believed.
+    """
+
+    mean: FloatArray
+    weights: FloatArray
 
 
 @dataclass(frozen=True)
@@ -150,7 +181,7 @@ def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def minimise(bundle: Bundle) -> tuple[Bundle, bool]:
-    """Return the guess with the smallest sum of squared residuals, by Levenberg-Marquardt.
+    """Return the guess with the smallest cost, by Levenberg-Marquardt.
 
     Returns
     -------
@@ -166,12 +197,12 @@ def minimise(bundle: Bundle) -> tuple[Bundle, bool]:
     residuals = bundle.residuals()
     if residuals is None:
         raise SolveError("camera calibration: a point is out of sight of the first guess", code="diverged")
-    cost, damping = float((residuals**2).sum()), 1e-3
+    cost, damping = bundle.cost(residuals), 1e-3
     for _ in range(MAX_ITERATIONS):
         equations = bundle.normal_equations(residuals)
         while True:
             trial, trial_residuals = _trial(bundle, equations, damping)
-            lower = np.inf if trial_residuals is None else float((trial_residuals**2).sum())
+            lower = np.inf if trial_residuals is None else trial.cost(trial_residuals)
             if trial_residuals is not None and lower <= cost:
                 break
             damping *= 8

@@ -15,10 +15,11 @@ import numpy as np
 
 from handeye import _core
 from handeye.detection.base import Detection
-from handeye.detection.bundle import Bundle, minimise
+from handeye.detection.bundle import Bundle, ParameterPrior, minimise
 from handeye.errors import DegenerateError, HandeyeError, InputError, SolveError
 from handeye.types import LENSES, Camera, Pose, Target
 from handeye.types.arrays import FloatArray
+from handeye.types.ordinary_lens import ordinary_lens
 
 MIN_VIEWS = 3
 MIN_POINTS = 4
@@ -29,6 +30,13 @@ START_VIEWS = 8
 # From which a lens is chosen, where none is asked for. Ordinary views cannot tell further coefficients
 # from each other: a lens that needs them has to be named.
 CHOICE = ("pinhole", "brown_conrady_4", "brown_conrady_5")
+# Where ordinary lenses are believed in, such coefficients do no harm.
+ORDINARY_CHOICE = ("brown_conrady_5", "kannala_brandt")
+# By so much its criterion has to be lower before another lens than the first of these is believed in: very
+# strong evidence (Kass and Raftery, "Bayes Factors", 1995).
+DECISIVE = 10.0
+# The noise of a point, px, until the residuals tell.
+USUAL_NOISE_PX = 0.2
 # No detection is better: lenses that all fit to less are equally good.
 LEAST_NOISE_PX = 1e-3
 # Parameters known no better than this (focal length and centre, in image widths) are not known.
@@ -69,6 +77,7 @@ def calibrate_camera(
     size_px: tuple[int, int],
     *,
     lens: str | None = None,
+    ordinary: bool = False,
 ) -> CameraCalibration:
     """Calibrate a camera from the points found in several images of one target.
 
@@ -82,7 +91,10 @@ def calibrate_camera(
         Width and height of the images.
     lens
         Name of one of `handeye.types.LENSES`; by default the one of `CHOICE` with the lowest Bayesian
-        information criterion.
+        information criterion; with `ordinary` one of `ORDINARY_CHOICE`.
+    ordinary
+        Believe besides that the lens is like ordinary ones (`handeye.types.ordinary_lens`): few views then
+        do not bend it to their noise, and the covariance says what they leave open.
 
     Raises
     ------
@@ -102,7 +114,7 @@ def calibrate_camera(
     }
     usable = {name: found for name, found in detections.items() if name not in rejected}
     _check_number(usable)
-    lenses = CHOICE if lens is None else (lens,)
+    lenses = (ORDINARY_CHOICE if ordinary else CHOICE) if lens is None else (lens,)
     # Without distortion all lenses of the choice are the same.
     first = lenses[0]
     begin = _start(first, target, usable, size_px)
@@ -127,9 +139,10 @@ def calibrate_camera(
     fits: list[tuple[float, CameraCalibration]] = []
     failures: list[HandeyeError] = []
     for candidate in lenses:
-        parameters = np.concatenate([begin, np.zeros(len(LENSES[candidate]) - len(begin))])
+        parameters = np.concatenate([begin[:4], np.zeros(len(LENSES[candidate]) - 4)])
         try:
-            best, converged = minimise(replace(start, lens=candidate, parameters=parameters))
+            guess = replace(start, lens=candidate, parameters=parameters)
+            best, converged = _as_ordinary(guess, size_px) if ordinary else minimise(guess)
             # What the views do not determine drifts: that is then why there is no end.
             fit = _calibration(best, tuple(usable), size_px, rejected)
             if not converged:
@@ -144,7 +157,22 @@ def calibrate_camera(
         fits.append((_information_criterion(fit, len(ids)), fit))
     if not fits:
         raise failures[0]
-    return min(fits, key=lambda fit: fit[0])[1]
+    best, chosen = min(fits, key=lambda fit: fit[0])
+    first, usual = fits[0]
+    return usual if ordinary and first < best + DECISIVE else chosen
+
+
+def _as_ordinary(guess: Bundle, size_px: tuple[int, int]) -> tuple[Bundle, bool]:
+    """Return the likeliest guess if the lens is an ordinary one; then again with the noise that it leaves."""
+    mean, sigmas = ordinary_lens(guess.lens, size_px, float(guess.parameters[0]))
+    noise, converged = USUAL_NOISE_PX, False
+    for _ in range(2):
+        guess, converged = minimise(replace(guess, prior=ParameterPrior(mean, noise**2 / sigmas**2)))
+        residuals = guess.residuals()
+        if residuals is None:  # `minimise` ends where all points are seen
+            raise AssertionError
+        noise = max(float(np.sqrt(np.mean(residuals**2))), LEAST_NOISE_PX)
+    return guess, converged
 
 
 def _information_criterion(fit: CameraCalibration, points: int) -> float:

@@ -91,10 +91,13 @@ class ArmModel:
         self, mounting: Mounting, joints: FloatArray, joint_rad: float
     ) -> tuple[FloatArray, FloatArray]:
         """What the arm does to A on its left at joints (N, n): noise roots (N, 6, n), constants (N, 6, k)."""
-        by_joint = self.kinematics.motion_jacobians(mounting, joints)
-        by_link = self.kinematics.link_jacobians(mounting, joints)[:, :, list(self.order)]
-        scaled = by_joint * self.scales
-        return scaled * joint_rad, np.concatenate([scaled[:, :, list(self.free)], by_link], axis=2)
+        scaled = self.kinematics.motion_jacobians(mounting, joints) * self.scales
+        by_link = self.kinematics.link_jacobians(mounting, joints)
+        count = len(self.free)
+        constants = np.empty((len(joints), 6, self.constants))
+        constants[:, :, :count] = scaled[:, :, list(self.free)]
+        constants[:, :, count:] = by_link[:, :, list(self.order)]
+        return scaled * joint_rad, constants
 
     @property
     def constants(self) -> int:

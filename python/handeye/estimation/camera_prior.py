@@ -5,16 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye.types.arrays import FloatArray
-from handeye.types.camera import Camera
+from handeye.types.camera import OPENCV_LENSES, Camera
+from handeye.types.ordinary_lens import DISTORTION_SIGMAS
 
 # Without a covariance: relative focal length, principal point as a share of the width, and coefficients.
 DEFAULT_FOCAL_SIGMA = 0.002
 DEFAULT_CENTRE_SIGMA = 0.002
 DEFAULT_DISTORTION_SIGMA = 0.02
-# A lens that was never measured (no coefficients, or all zero): what ordinary lenses are like, in the order
-# k1, k2, p1, p2, k3.
+# A lens that was never measured (no coefficients, or all zero): what ordinary lenses are like.
 UNMEASURED_LENS = "brown_conrady_5"
-UNMEASURED_DISTORTION_SIGMAS = (0.1, 0.1, 0.002, 0.002, 0.1)
+# Lenses for which zeros say that nothing was measured.
+UNMEASURED_FORMS = OPENCV_LENSES - {"kannala_brandt"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +68,15 @@ def camera_prior(camera: Camera, *, fixed: bool = False) -> CameraPrior:
         return CameraPrior(camera, (), np.zeros((0, 0)), np.zeros(0), inflated=False, from_these_pixels=False)
     covariance = camera.covariance
     if covariance is None:
-        unmeasured = camera.lens != "kannala_brandt" and not camera.distortion.any()
+        unmeasured = camera.lens in UNMEASURED_FORMS and not camera.distortion.any()
         if unmeasured:
-            zeros = np.zeros(len(UNMEASURED_DISTORTION_SIGMAS))
+            zeros = np.zeros(len(DISTORTION_SIGMAS[UNMEASURED_LENS]))
             camera = Camera(UNMEASURED_LENS, np.concatenate([camera.parameters[:4], zeros]), *camera.size_px)
         fx, fy, _, _ = camera.parameters[:4]
         centre = DEFAULT_CENTRE_SIGMA * camera.width_px
         deviations = [DEFAULT_FOCAL_SIGMA * fx, DEFAULT_FOCAL_SIGMA * fy, centre, centre]
         deviations += (
-            UNMEASURED_DISTORTION_SIGMAS
+            DISTORTION_SIGMAS[UNMEASURED_LENS]
             if unmeasured
             else [DEFAULT_DISTORTION_SIGMA] * (len(camera.parameters) - 4)
         )

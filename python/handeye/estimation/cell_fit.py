@@ -211,6 +211,10 @@ def _once(
             measured.camera_poses,
             free_camera=list(priors[camera].free) or None,
             board_scale=True,
+            sigmas_px=[
+                None if view.sigmas_px is None else np.hypot(view.sigmas_px, LEAST_PIXEL_SIGMA)
+                for view in measured.views
+            ],
         )
         variances = poses.shrunk_variances(prior_degrees=PIXEL_PRIOR_DEGREES, floor_px2=LEAST_PIXEL_SIGMA**2)
         shared = poses.shared_error(variances)

@@ -25,6 +25,7 @@ from handeye.errors import DegenerateError, InputError
 from handeye.estimation.measurements import Measurements
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import MM_PER_M, Calibration
+from handeye.types.pose import inverses
 from handeye.types.recording import Recording
 
 # Relative gap between cost and bound that counts as none; costs are in units of the noise.
@@ -147,7 +148,7 @@ def certify(problem: PoseProblem, X: FloatArray, Y: FloatArray) -> Certificate:
     cost = float(residual @ residual)
     bound = cost - float(z @ z) * _shortfall(system.M, z, cost)
     x, y = _answer(system, rotations, z, len(given_x))
-    difference = np.concatenate([np.linalg.inv(given_x) @ x, np.linalg.inv(given_y) @ y])
+    difference = np.concatenate([inverses(given_x) @ x, inverses(given_y) @ y])
     angles = np.arccos(np.clip((np.trace(difference[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1, 1))
     return Certificate(
         certified=cost - bound <= CLOSED_GAP * max(cost, 1.0),
@@ -187,11 +188,11 @@ def _indices(problem: PoseProblem) -> tuple[Sequence[int], Sequence[int]]:
 def _sigmas(problem: PoseProblem, X: FloatArray, Y: FloatArray) -> tuple[float, float]:
     """Standard deviations per axis of the residuals of an answer, radians and metres."""
     cameras, targets = _indices(problem)
-    W = np.linalg.inv(Y)
-    residual = problem.C @ W[list(targets)] - X[list(cameras)] @ problem.A
+    W = inverses(Y)
+    residual: FloatArray = problem.C @ W[list(targets)] - X[list(cameras)] @ problem.A
     # The difference of two rotation matrices has twice the square of the angle between them.
-    rotation = np.sqrt(np.mean(np.sum(residual[:, :3, :3] ** 2, axis=(1, 2))) / 6)
-    translation = np.sqrt(np.mean(np.sum(residual[:, :3, 3] ** 2, axis=1)) / 3)
+    rotation = np.sqrt(float(np.sum(residual[:, :3, :3] ** 2)) / len(residual) / 6)
+    translation = np.sqrt(float(np.sum(residual[:, :3, 3] ** 2)) / len(residual) / 3)
     return max(float(rotation), LEAST_SIGMA), max(float(translation), LEAST_SIGMA)
 
 
@@ -221,17 +222,15 @@ class _System:
             rows[view, row, w], rows[view, row, x] = turned[:, row], -carried[:, row]
         for row in range(3):
             rows[view, 9 + row, x] = -moved[:, row]
-            rows[view, 9 + row, t_w], rows[view, 9 + row, t_x] = (
-                seen[:, row] / sigmas[1],
-                -eye[row] / sigmas[1],
-            )
+            rows[view, 9 + row, t_w] = seen[:, row] / sigmas[1]
+            rows[view, 9 + row, t_x] = -eye[row] / sigmas[1]
         rows[:, 9:, width] = C[:, :3, 3] / sigmas[1]
         flat = rows.reshape(12 * count, -1)
         fixed, free = flat[:, : width + 1], flat[:, width + 1 :]
         values = np.linalg.svd(free, compute_uv=False)
         if values[-1] < 1e-9 * values[0]:
             raise DegenerateError("these views do not determine the translations", code="degenerate")
-        solve = -np.asarray(np.linalg.lstsq(free, fixed, rcond=None)[0])
+        solve = -np.asarray(np.linalg.lstsq(free, fixed, rcond=None)[0], np.float64)
         left = fixed + free @ solve
         return cls(np.asarray(np.linalg.qr(left, mode="r"), np.float64), solve)
 
@@ -278,7 +277,7 @@ def _descend(system: _System, rotations: FloatArray) -> FloatArray:
         H, g = J.T @ J, J.T @ residual
         scale = np.diag(np.maximum(np.diag(H), 1e-300))
         while True:
-            step = -np.linalg.lstsq(H + damping * scale, g, rcond=1e-15)[0]
+            step = -np.asarray(np.linalg.lstsq(H + damping * scale, g, rcond=1e-15)[0], np.float64)
             turned = _turned(rotations, step.reshape(-1, 3))
             residual_next = system.M @ np.append(_stacked(turned), 1.0)
             after = float(residual_next @ residual_next)
@@ -299,7 +298,7 @@ def _answer(
     both = np.tile(np.eye(4), (len(rotations), 1, 1))
     both[:, :3, :3] = rotations
     both[:, :3, 3] = (system.translations @ z).reshape(-1, 3)
-    return both[-cameras:], np.linalg.inv(both[:-cameras])
+    return both[-cameras:], inverses(both[:-cameras])
 
 
 def _shortfall(M: FloatArray, z: FloatArray, cost: float) -> float:
@@ -316,9 +315,9 @@ def _shortfall(M: FloatArray, z: FloatArray, cost: float) -> float:
     residual, wide = M @ z, M @ across
     gradient = wide.T @ residual - cost * across[-1]
     at_z = across.T @ (constraints @ z).T
-    multipliers = np.linalg.lstsq(at_z, -gradient, rcond=None)[0]
-    F = wide.T @ wide - cost * np.outer(across[-1], across[-1])
-    F += across.T @ np.tensordot(multipliers, constraints, 1) @ across
+    multipliers = np.asarray(np.linalg.lstsq(at_z, -gradient, rcond=None)[0], np.float64)
+    forms: FloatArray = np.tensordot(multipliers, constraints, 1)
+    F = wide.T @ wide - cost * np.outer(across[-1], across[-1]) + across.T @ forms @ across
     size = float(np.linalg.norm(multipliers))
     terms = np.linalg.norm(wide) * np.linalg.norm(residual) + np.linalg.norm(at_z) * size
     row = float(np.linalg.norm(gradient + at_z @ multipliers) + ROUNDING * terms) / length

@@ -71,7 +71,7 @@ def within(covariance: FloatArray, degrees_of_freedom: float, probability: float
 
 
 def radius(covariance: FloatArray, degrees_of_freedom: float, probability: float = PROBABILITY) -> float:
-    """Return the radius within which a vector of a covariance (3, 3) lies with a probability, in its unit."""
+    """Return the radius within which a vector of a covariance (n, n) lies with a probability, in its unit."""
     return float(radii(covariance[np.newaxis], degrees_of_freedom, probability)[0])
 
 
@@ -81,10 +81,10 @@ def radii(
     probability: float = PROBABILITY,
     means: FloatArray | None = None,
 ) -> FloatArray:
-    """(Q,) radii within which vectors of covariances (Q, 3, 3) lie, about zero or means (Q, 3)."""
+    """(Q,) radii within which vectors of covariances (Q, n, n) lie, about zero or means (Q, n)."""
     # A fixed sample: the same covariance has the same radius, to a hundredth.
     random = np.random.default_rng(20)
-    draws = random.standard_normal((_DRAWS, 3))
+    draws = random.standard_normal((_DRAWS, covariances.shape[-1]))
     if np.isfinite(degrees_of_freedom):
         draws /= np.sqrt(random.chisquare(degrees_of_freedom, _DRAWS) / degrees_of_freedom)[:, np.newaxis]
     variances, axes = np.linalg.eigh(covariances)

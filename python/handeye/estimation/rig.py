@@ -108,6 +108,10 @@ class RigEstimate:
     def of_camera(self, camera: str) -> Estimate:
         """Return what is believed of one camera and the target that stands for it."""
         target = self.target_of(camera) or next(iter(self.fit.measurements.of_camera(camera)))
+        return self.of_pair(camera, target)
+
+    def of_pair(self, camera: str, target: str) -> Estimate:
+        """Return what is believed of one camera and one target."""
         views = [pixels.sigma_px for (name, _), pixels in self.fit.pixels.items() if name == camera]
         noise = replace(self.noise, pixel_sigma_px=tuple(float(s) for s in np.concatenate(views)))
         return estimate_of(self.fit, camera, target, noise, self.unobservable[camera], self.attribution)

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handeye.errors import InputError
 from handeye.export.base import Exporter, hash_comments, number, quoted
 from handeye.export.mount import Mount
 from handeye.types import Camera, Mounting, Pose
 from handeye.types.arrays import FloatArray
+from handeye.types.camera import OPENCV_LENSES
 
 _PER_LINE = 4
 
@@ -36,6 +38,12 @@ def _transform(name: str, pose: Pose) -> str:
 
 
 def _camera(camera: Camera) -> str:
+    if camera.lens not in OPENCV_LENSES:
+        raise InputError(
+            f"a camera of lens {camera.lens}: OpenCV has no form for it",
+            code="unknown_lens",
+            hint=f"export to another format, or calibrate with one of {', '.join(sorted(OPENCV_LENSES))}",
+        )
     fisheye = int(camera.lens == "kannala_brandt")
     coefficients = camera.distortion if len(camera.distortion) else np.zeros(4)
     return (

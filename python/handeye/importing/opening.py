@@ -21,13 +21,16 @@ from handeye.datasets import (
 from handeye.datasets.bags import Contents
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.pose_list import stated_target
+from handeye.datasets.pose_pairs import PoseStreams
 from handeye.datasets.pose_rows import NOTHING_STATED
-from handeye.detection import Detection, Image, Reason, calibrate_camera, detect_all
-from handeye.errors import DetectionError, HandeyeError, InputError
+from handeye.detection import Detection, Image, Reason, detect_all
+from handeye.errors import DetectionError, HandeyeError, InputError, UnstatedError
 from handeye.estimation import Measurements
 from handeye.importing.bag_choice import NOTHING_CHOSEN, BagOptions
 from handeye.importing.bags import Timing, pictures_of
+from handeye.importing.own_camera import calibrated_from_used_views, camera_of_views
 from handeye.importing.readings import compare
+from handeye.importing.streams import pairs_of
 from handeye.importing.unstated import unstated
 from handeye.robots import Arm
 from handeye.types import Camera, Mounting, Recording, Target
@@ -176,16 +179,19 @@ def open_any(
         mounting=options.mounting,
         poses=options.poses,
         stated=options.stated,
+        arm=options.arm,
     )
     if isinstance(loaded, LoadedRecording):
         return _of_recording(loaded, options.camera)
     if isinstance(loaded, PosePairs):
         return loaded
+    if isinstance(loaded, PoseStreams):
+        return pairs_of(loaded)
     if isinstance(loaded, Contents):
         return _of_bag(loaded, options, progress or _nothing)
     if isinstance(loaded, UnreadPoses):
         opened = _of_images(loaded.images, options.camera, progress or _nothing)
-        raise _told_by_pictures(loaded, opened.recording, options.mounting)
+        raise told_by_pictures(loaded, opened.recording, options.mounting)
     return _of_images(loaded, options.camera, progress or _nothing)
 
 
@@ -214,6 +220,8 @@ def _of_images(images: ImageSet, given: Camera | None, progress: Callable[[int, 
         if (detection := found.get(shot.name)) is not None
     ]
     recording = images.recording(camera, views)
+    if origin is CameraOrigin.CALIBRATED:
+        recording = calibrated_from_used_views(recording)
     # What both the set and the recording made of it look at is said once.
     notes = dict.fromkeys(detection.note for detection in found.values() if detection.note)
     differs = [DataWarning("target_differs", note) for note in notes]
@@ -288,9 +296,7 @@ def _camera(
         if camera is not None:
             _check_size(camera, size, f"the pictures in {images.folder}")
             return camera, origin
-    camera = calibrate_camera(images.target, found, size).camera
-    of_views = Camera(camera.lens, camera.parameters, *camera.size_px, camera.covariance, from_views=True)
-    return of_views, CameraOrigin.CALIBRATED
+    return camera_of_views(images.target, found, size), CameraOrigin.CALIBRATED
 
 
 def _check_size(camera: Camera, size: tuple[int, int], what: str) -> None:
@@ -304,7 +310,7 @@ def _check_size(camera: Camera, size: tuple[int, int], what: str) -> None:
         )
 
 
-def _told_by_pictures(unread: UnreadPoses, recording: Recording, mounting: Mounting | None) -> InputError:
+def told_by_pictures(unread: UnreadPoses, recording: Recording, mounting: Mounting | None) -> UnstatedError:
     """Return the error that says which way to read the robot's poses agrees with the pictures."""
     measurements = Measurements.of_recording(recording)
     places = {shot.name: row for row, shot in enumerate(unread.images.shots)}

@@ -180,6 +180,14 @@ def _missed(motions: FloatArray, camera_poses: FloatArray) -> tuple[float, float
     return None if errors is None else (float(np.median(errors[0])), float(np.median(errors[1])))
 
 
+def chain_misses(robot: FloatArray, mounting: Mounting, camera_poses: FloatArray) -> float:
+    """Return by how much the chain of robot poses (N, 4, 4) misses the target; infinite for no chain."""
+    missed = _missed(_chain(robot, mounting), camera_poses)
+    if missed is None:
+        return float("inf")
+    return float(np.hypot(max(missed[0] / FLOOR_RAD, 1.0), max(missed[1] / FLOOR_M, 1.0)))
+
+
 def chain_errors(predicted: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the angles (N,) in radians and distances (N,) in metres between transforms (N, 4, 4)."""
     traces = np.einsum("nij,nij->n", predicted[:, :3, :3], seen[:, :3, :3])

@@ -7,6 +7,7 @@ import numpy as np
 
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate
+from handeye.estimation.lens_confidence import lens_within_px
 from handeye.planning.collisions import Body
 from handeye.planning.prediction import Sight
 from handeye.planning.visibility import obstacles
@@ -14,6 +15,8 @@ from handeye.robots import Arm
 from handeye.types import Mounting
 from handeye.types.arrays import FloatArray, IndexArray
 
+# A lens that is known this well needs no room of its own.
+KNOWN_LENS_PX = 3.0
 NEAR_FAILURE = "near to where it failed before"
 
 
@@ -153,13 +156,18 @@ def mounted_points(estimate: Estimate) -> FloatArray:
 
 
 def _doubt_px(estimate: Estimate, limits: ViewLimits) -> float:
-    """Twice the deviation in px by which the estimate may misplace the target, up to a fifth of the image."""
+    """Twice the deviation in px by which the estimate may misplace the target, up to a fifth of the image.
+
+    And by how much a lens may that is still being learnt.
+    """
     covariance = estimate.covariance[:12, :12]
     shift = np.sqrt(np.trace(covariance[:3, :3]) + np.trace(covariance[6:9, 6:9]))
     turn = np.sqrt(np.trace(covariance[3:6, 3:6]))
     focal = float(estimate.camera.parameters[:2].max())
     deviation = focal * (shift / float(np.mean(limits.distance_m)) + turn)
-    return float(min(2 * deviation, 0.2 * min(estimate.camera.size_px)))
+    lens = lens_within_px(estimate)
+    doubt = 2 * deviation + (lens if lens > KNOWN_LENS_PX else 0.0)
+    return float(min(doubt, 0.2 * min(estimate.camera.size_px)))
 
 
 def _distances(joints: FloatArray, others: FloatArray) -> FloatArray:

@@ -90,7 +90,12 @@ class Prediction:
             (N, n) joint positions of the candidates, if the arm is known. Without them constants of the arm
             are taken as if they moved nothing.
         """
-        return self._predictor.gains(self._belief, criterion, motions, arm=self._arm(joints))
+        # What the arm does, and what a view tells of the camera, is asked only where it shows the target.
+        gains = np.full(len(motions), np.nan)
+        seen = np.flatnonzero(self._predictor.in_sight(motions))
+        arm = self._arm(None if joints is None else joints[seen])
+        gains[seen] = self._predictor.gains(self._belief, criterion, motions[seen], arm=arm)
+        return gains
 
     def informations(self, motions: FloatArray, joints: FloatArray | None = None) -> FloatArray:
         """(N, n, n) information of candidate views; zero where too little would be in sight."""

@@ -171,6 +171,23 @@ class Arm:
         flat, shape = self._positions(joints)
         return self._chain.jacobians(flat, frame).reshape(*shape, 6, len(self))
 
+    def displacements(
+        self, joints: ArrayLike, which: Sequence[int], twists: ArrayLike, frame: str = "flange"
+    ) -> FloatArray:
+        """(..., 6, m) twists of the flange where joints sit displaced on the link before them, at (..., n).
+
+        Way w displaces joint ``which[w]`` by ``twists[w]`` (m, 6), metres and radians in the joint's own
+        frame before it moves; frames as of `jacobian`.
+
+        Raises
+        ------
+        InputError
+            As `jacobian`.
+        """
+        flat, shape = self._positions(joints)
+        found = self._chain.displacements(flat, frame, list(which), twists)
+        return found.reshape(*shape, 6, len(which))
+
     def inverse(
         self, T_base_flange: Pose, start: ArrayLike | None = None, *, attempts: int = 100
     ) -> FloatArray:

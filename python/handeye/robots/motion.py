@@ -77,8 +77,8 @@ class ArmKinematics:
         the base.
         """
         if mounting is Mounting.EYE_IN_HAND:
-            return -(self.T_tip_flange.inverse().adjoint() @ self.arm.jacobian(joints, "flange"))
-        return self.T_base_root.adjoint() @ self.arm.jacobian(joints, "base")
+            return -_seen_from(self.T_tip_flange.inverse(), self.arm.jacobian(joints, "flange"))
+        return _seen_from(self.T_base_root, self.arm.jacobian(joints, "base"))
 
     @property
     def link_twists(self) -> FloatArray:
@@ -101,19 +101,20 @@ class ArmKinematics:
 
     def link_jacobians(self, mounting: Mounting, joints: FloatArray) -> FloatArray:
         """(K, 6, m) L at joint positions (K, n): truly ``A = exp(L l) A_reported``, l metres and radians."""
-        before = np.broadcast_to(self.T_base_root.matrix, (len(joints), 4, 4))
-        ways = self.link_twists
-        total = np.zeros((len(joints), 6, ways.shape[2]))
-        for i, joint in enumerate(self.arm.joints):
-            placed = np.ascontiguousarray(before @ joint.placement.matrix)
-            total += _core.se3_adjoint(placed) @ ways[i]
-            screw = np.zeros(6)
-            axis = np.array(joint.axis)
-            screw[(0 if joint.sliding else 3) :][:3] = axis / np.linalg.norm(axis)
-            before = placed @ _core.se3_exp(np.outer(joints[:, i], screw))
-        if mounting is Mounting.EYE_TO_HAND:
-            return total
-        return -_core.se3_adjoint(np.linalg.inv(self.forward(joints))) @ total
+        twists = self.link_twists
+        which = np.abs(twists).sum(axis=1).argmax(axis=0)
+        of_joint = twists[which, :, np.arange(twists.shape[2])]
+        if mounting is Mounting.EYE_IN_HAND:
+            moved = self.arm.displacements(joints, which.tolist(), of_joint, "flange")
+            return -_seen_from(self.T_tip_flange.inverse(), moved)
+        return _seen_from(self.T_base_root, self.arm.displacements(joints, which.tolist(), of_joint, "base"))
+
+
+def _seen_from(T: Pose, twists: FloatArray) -> FloatArray:
+    """Carry twists (K, 6, m) through a transform that is the same for all."""
+    if Pose.identity() == T:
+        return twists
+    return np.asarray(np.einsum("ij,kjm->kim", T.adjoint(), twists, optimize=True))
 
 
 def arm_kinematics(arm: Arm, views: Sequence[View]) -> ArmKinematics:

@@ -1,99 +1,35 @@
 """The cell that follows from what was asked for: its drivers, where its arm stands, and its session."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from handeye.cameras.protocol import ImageSource, checked_frame
 from handeye.cameras.render import Appearance
 from handeye.cameras.simulated import Optics
-from handeye.errors import InputError
+from handeye.errors import DeviceError, InputError
 from handeye.importing import SourceOptions, open_folder
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm, open_arm, shipped_arms
 from handeye.robots.protocol import Goal
 from handeye.robots.replay import ReplayRobot
 from handeye.robots.shapes import read_shapes
-from handeye.robots.simulated import SimulatedArm
 from handeye.session.attempt import Cell
-from handeye.session.choosing import ArmChooser
-from handeye.session.deciding import Chooser
+from handeye.session.calls import Calls
 from handeye.session.drivers import REPLAY, Person, open_camera, open_robot, replayed_camera
 from handeye.session.entry import Entry, views_of
 from handeye.session.loop import Session
 from handeye.session.observer import Observer
-from handeye.session.recorded import RecordedChooser
+from handeye.session.prepared import Prepared
 from handeye.session.safety import body_of
+from handeye.session.self_calibration import SelfCalibration, nominal_camera
 from handeye.session.settings import Collisions, Configuration, check_fingerprints, fingerprints, read_start
 from handeye.session.simulated import SimulationOptions, simulated_cell
 from handeye.session.starting import Start
 from handeye.session.store import SessionStore, create_session, open_session
-from handeye.types import Camera, Mounting, Recording, Target, Truth, View
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """A run, ready to begin.
-
-    Parameters
-    ----------
-    cell
-        The world.
-    start
-        Where the arm stands; None in a replay, which begins with any view.
-    recording
-        What its views will be written into.
-    truth
-        What is true, where that is known.
-    hidden_arm
-        The arm as it is, if it is simulated.
-    recorded
-        The views that a replay goes through.
-    """
-
-    configuration: Configuration
-    cell: Cell
-    start: Start | None
-    recording: Recording
-    truth: Truth | None = None
-    hidden_arm: SimulatedArm | None = None
-    recorded: tuple[View, ...] | None = None
-
-    @property
-    def arm(self) -> Arm:
-        """The arm.
-
-        Raises
-        ------
-        InputError
-            A replay of an arm that is not known.
-        """
-        if self.cell.arm is None:
-            raise InputError(
-                "the arm is not known", code="missing_value", hint="name it with its description"
-            )
-        return self.cell.arm
-
-    def chooser(self) -> Chooser:
-        """Return what decides where to go.
-
-        Raises
-        ------
-        InputError
-            Recorded poses that are not those of the arm.
-        """
-        cell, wish = self.cell, self.configuration.wish()
-        if self.recorded is not None:
-            return RecordedChooser(self.recorded, wish, cell.arm)
-        if cell.workspace is None or self.start is None:
-            raise InputError("a workspace and where the arm stands are needed", code="missing_value")
-        limits = self.configuration.limits
-        return ArmChooser(self.arm, cell.workspace, cell.camera, self.start, wish, limits, cell.solids)
-
-    def session(self, store: SessionStore) -> Session:
-        """Return the session that writes into a store."""
-        return Session(self.cell, store, self.chooser(), self.configuration.wish())
+from handeye.types import Camera, Mounting, Recording, Target
 
 
 def prepare(
@@ -111,7 +47,8 @@ def prepare(
     Parameters
     ----------
     camera, target
-        Needed unless the cell is simulated; a replay has them from its recording.
+        The target is needed unless the cell is simulated; a replay has both from its recording. Without a
+        camera one picture is taken to see its size, and the views of the session teach it.
     person
         Asked by the drivers that need a person.
     start
@@ -143,12 +80,17 @@ def prepare(
     )
     if configuration.is_simulated:
         return _simulated(configuration, arm, target, confirm, solids, observer)
-    if camera is None or target is None:
-        raise InputError("a real cell needs camera and target", code="missing_value")
+    if target is None:
+        raise InputError(
+            "a real cell needs a target", code="missing_value", hint="name its file with --target"
+        )
     workspace = configuration.workspace()
     person = person or Person(_nobody, lambda _: None)
     robot = open_robot(configuration.driver, person, arm, joints_told=_told(start))
     source = open_camera(configuration.images, robot, person, configuration.patience.grab_s)
+    if camera is None:
+        camera = nominal_camera(_pictured_size(source, configuration.patience.grab_s), configuration.lens)
+        configuration = replace(configuration, camera_known=False)
     cell = Cell(
         robot,
         source,
@@ -187,6 +129,9 @@ def begin(prepared: Prepared, folder: Any) -> tuple[Session, SessionStore]:  # n
             "posture_known": prepared.start.posture_known,
         }
     settings |= fingerprints(prepared.cell.arm, prepared.recorded)
+    if not prepared.configuration.camera_known:
+        cell, lens = prepared.cell, prepared.configuration.lens
+        settings |= SelfCalibration(cell.target, cell.camera.size_px, lens).setting()
     prepared.chooser()  # refused before anything is written
     store = create_session(folder, prepared.recording, settings)
     return prepared.session(store), store
@@ -214,7 +159,7 @@ def go_on(
         begun = bool(views_of(store.entries)) or configuration.is_simulated
         # Before the first view the arm may be driven elsewhere, and begins from there.
         start = read_start(store.settings) if begun and not configuration.is_replay else None
-        recording = store.recording
+        recording = store.begun_with
         prepared = prepare(
             configuration,
             camera=recording.camera,
@@ -322,7 +267,7 @@ def _replayed(
     recording = Recording(
         f"replay of {source.name}", source.mounting, source.camera, source.target, (), None, source.source
     )
-    configuration = replace(configuration, mounting=source.mounting)
+    configuration = replace(configuration, mounting=source.mounting, camera_known=True)
     return Prepared(configuration, cell, None, recording, source.truth, recorded=source.views)
 
 
@@ -369,6 +314,7 @@ def _simulated(
         optics=optics,
         faults=wrong.faults,
         camera_error=wrong.camera_error,
+        lens=wrong.lens,
     )
     made = simulated_cell(arm, options)
     cell = made.cell
@@ -383,8 +329,33 @@ def _simulated(
         speed_rad_s=configuration.speed_rad_s,
         observer=observer,
     )
+    recording = made.recording
+    if not configuration.camera_known:
+        nominal = nominal_camera(cell.camera.size_px, configuration.lens)
+        cell, recording = replace(cell, camera=nominal), replace(recording, camera=nominal)
     start = _safe(made.start, cell)
-    return Prepared(configuration, cell, start, made.recording, made.truth, made.hidden_arm)
+    return Prepared(
+        configuration, cell, start, recording, made.truth, made.hidden_arm, true_camera=made.true_camera
+    )
+
+
+def _pictured_size(source: ImageSource, patience_s: float) -> tuple[int, int]:
+    """Return width and height of the pictures, from one that is looked at for nothing else.
+
+    Raises
+    ------
+    DeviceError
+        The camera does not answer, or with something else than a picture.
+    """
+    frame = checked_frame(Calls("camera").run(patience_s, source.grab, "size_of_image"))
+    if frame.image is None:
+        raise DeviceError(
+            "the camera tells points without a picture, and its size is not known",
+            code="bad_frame",
+            hint="give its calibration with --camera",
+        )
+    height, width = frame.image.shape
+    return width, height
 
 
 def _nobody(question: str) -> str:

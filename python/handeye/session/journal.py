@@ -65,16 +65,20 @@ class Settings:
 
 
 class Journal:
-    """The attempts of a session, in memory and on the disk."""
+    """The attempts of a session, in memory and on the disk.
+
+    `torn` is how many bytes of a last line were found that was not written to its end.
+    """
 
     def __init__(
-        self, path: Path, entries: list[Entry], size: int, chain: bytes, ending: bytes = b""
+        self, path: Path, entries: list[Entry], size: int, chain: bytes, ending: bytes = b"", torn: int = 0
     ) -> None:
         self._path = path
         self._entries = entries
         self._size = size
         self._chain = chain
         self._ending = ending
+        self.torn = torn
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -176,7 +180,10 @@ def read_settings(folder: Path) -> Settings:
 
 
 def read_journal(folder: Path, settings: Settings | None = None) -> Journal:
-    """Return the journal of a session; a last line that was cut off is as if it had never been written.
+    """Return the journal of a session; a last line that was not written to its end is left out, and counted.
+
+    It was cut off, or the system had made room for it and not yet filled it: then it holds zeros. Where only
+    the line feed is missing, the line is kept.
 
     Raises
     ------
@@ -187,6 +194,9 @@ def read_journal(folder: Path, settings: Settings | None = None) -> Journal:
     path = folder / JOURNAL_FILE
     content = read_bytes(path, MAX_JOURNAL_BYTES)
     *whole, rest = content.split(b"\n")
+    torn = 0
+    if whole and not rest.strip(b"\0") and b"\0" in whole[-1]:
+        torn = len(whole.pop()) + 1
     chain, size, ending = known.digest, 0, b""
     entries: list[Entry] = []
     chained = known.version >= VERSION
@@ -205,14 +215,14 @@ def read_journal(folder: Path, settings: Settings | None = None) -> Journal:
             )
         entries.append(entry)
         size += len(line) + 1
-    if rest:
+    if rest and not torn:
         body, found = _parts(rest)
         following = _digest(chain + body)
         if found == following:
             # Whole but for the line feed.
             entries.append(_entry(body, f"{path}: line {len(entries) + 1}", len(entries) + 1))
-            chain, size, ending = following, size + len(rest), b"\n"
-    return Journal(path, entries, size, chain, ending)
+            chain, size, ending, rest = following, size + len(rest), b"\n", b""
+    return Journal(path, entries, size, chain, ending, torn + len(rest))
 
 
 def _parts(line: bytes) -> tuple[bytes, bytes | None]:

@@ -2,17 +2,21 @@
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 
 from handeye import _core
 from handeye.detection import Detection, Prediction, relabeled
 from handeye.errors import HandeyeError
-from handeye.estimation import Estimate, view_pose
+from handeye.estimation import Estimate, Measurements, view_pose
 from handeye.robots.replay import is_near
 from handeye.types import Camera, Pose, Target, View
+from handeye.types.arrays import FloatArray
 
 # Root mean square error of one view's own pose beyond which its points are no picture of the target.
 LARGEST_RMSE_PX = 3.0
+# By so much of its size in the image a lens may bend the picture of a flat target.
+LARGEST_BEND = 0.08
 # A view this much off what is believed is believed to be wrong, however sure the belief: metres, radians.
 LARGEST_SURPRISE = (0.02, np.deg2rad(3.0))
 SIGMAS = 6.0
@@ -20,6 +24,10 @@ SIGMAS = 6.0
 FEWEST_WITNESSES = 4
 # The arm's own errors are not all known: a prediction is never taken to be better than this.
 LEAST_MARGIN_PX = 8.0
+# Views agree where none is farther off what is believed than the first, nor so many times as far as the
+# median, which is not taken to be less than the second: metres, radians.
+AGREEMENT = ((0.0015, 1e-4), (np.deg2rad(0.3), np.deg2rad(0.02)))
+STANDS_OUT = 3.0
 # Points that all moved less than this did not move, though the arm moved more than this: metres, radians.
 UNCHANGED_PX = 0.5
 ELSEWHERE = (0.005, np.deg2rad(1.0))
@@ -43,17 +51,21 @@ def labeled(camera: Camera, target: Target, detection: Detection, T_base: Pose, 
 
 
 def objection(
-    camera: Camera, target: Target, view: View, estimate: Estimate | None, views: int
+    camera: Camera | None, target: Target, view: View, estimate: Estimate | None, views: int
 ) -> str | None:
     """Say why a view cannot be true, None if it may be.
 
     Parameters
     ----------
+    camera
+        As it was given, or as the views teach it, this one included; None where they do not yet.
     estimate
         What the other views say.
     views
         How many these are.
     """
+    if camera is None:
+        return _no_plane(target, view)
     try:
         pose = view_pose(camera, target, view)
     except HandeyeError as error:
@@ -67,6 +79,44 @@ def objection(
     choices = [pose.T_camera_target] + ([] if pose.mirrored is None else [pose.mirrored[0]])
     complaints = [_surprise(estimate, A, expected, seen) for seen in choices]
     return None if None in complaints else complaints[0]
+
+
+def _no_plane(target: Target, view: View) -> str | None:
+    """Say why points are no picture of a flat target, whatever the camera; None if they may be.
+
+    A homography takes the target into the image but for the distortion of the lens.
+    """
+    points = target.points[view.point_ids, :2]
+    H: FloatArray | None = cv2.findHomography(points, view.pixels)[0]  # pyright: ignore[reportAssignmentType]
+    if H is None:
+        return "its points are no picture of a flat target"
+    mapped: FloatArray = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ H.T
+    off: FloatArray = mapped[:, :2] / mapped[:, 2:] - view.pixels
+    rms = float(np.linalg.norm(off)) / len(points) ** 0.5
+    extent = float(np.ptp(view.pixels, axis=0).max())
+    if not rms <= LARGEST_BEND * extent:
+        return f"its points are {rms:.0f} px from any picture of a flat target"
+    return None
+
+
+def all_agree(measurements: Measurements, estimate: Estimate) -> bool:
+    """Tell whether every view is where the estimate has it, and none stands out: then none is a mistake.
+
+    A wrong view shows even where it has drawn the estimate to it: it then lies several times farther off than
+    the median, or all of them are far off.
+    """
+    predicted = estimate.X.matrix @ measurements.motions @ estimate.Y.matrix
+    seen = measurements.camera_poses
+    middle = measurements.target.points.mean(axis=0)
+    off_m = np.linalg.norm(
+        (predicted[:, :3, :3] - seen[:, :3, :3]) @ middle + predicted[:, :3, 3] - seen[:, :3, 3], axis=1
+    )
+    turns = np.einsum("kji,kjl->kil", predicted[:, :3, :3], seen[:, :3, :3])
+    off_rad = np.linalg.norm(turns - np.eye(3), axis=(1, 2)) / np.sqrt(2.0)
+    return all(
+        off.max() <= limit and off.max() <= STANDS_OUT * max(float(np.median(off)), floor)
+        for off, limit, floor in ((off_m, *AGREEMENT[0]), (off_rad, *AGREEMENT[1]))
+    )
 
 
 def unchanged(view: View, others: Sequence[View]) -> bool:

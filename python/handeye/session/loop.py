@@ -4,16 +4,19 @@ What happens next is a function of the journal and the seed alone: after a break
 """
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
 from handeye.estimation.confidence import Within
-from handeye.estimation.mistakes import examine
+from handeye.estimation.lens_confidence import lens_within_px
+from handeye.estimation.mistakes import Examination, examine
 from handeye.session.attempt import Cell
 from handeye.session.contract import check_at_rest
 from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step
 from handeye.session.entry import Entry, Failure, views_of
+from handeye.session.judging import all_agree
 from handeye.session.store import SessionStore
 from handeye.session.taking import Taker
 from handeye.session.wish import Wish
@@ -26,7 +29,10 @@ FEWEST_EXAMINED = 5
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """How a run ended: the answer if the views determine one, and how far off it may be."""
+    """How a run ended: the answer if the views determine one, and how far off it may be.
+
+    `lens_px` is within how many pixels the lens is known, where the views taught it; None otherwise.
+    """
 
     reason: EndReason
     sentence: str
@@ -35,6 +41,7 @@ class End:
     views: int
     attempts: int
     estimate: Estimate | None = None
+    lens_px: float | None = None
 
 
 class Session:
@@ -67,6 +74,8 @@ class Session:
         known = wish.joints_err and wish.model is ModelName.AUTO
         self._kinematics = chooser.kinematics if known else None
         self._estimator: Estimator = make_estimator(wish.model, self._kinematics)
+        # Where no camera was given there is none until the views teach one.
+        self._learning = store.self_calibration
         self._measurements = self._no_measurements()
         self._forgiven_up_to: int | None = None
 
@@ -101,10 +110,9 @@ class Session:
                 "the arm may still move",
             )
         views = self._usable()
-        measurements = _without_mistakes(self._with(views))
+        measurements, estimate = self._planned_from(views)
         if len(measurements) < len(views) and len(views) >= self._wish.most_views:
             return self._end(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
-        estimate = self._estimator(measurements) if len(measurements) >= START_VIEWS else None
         attempts = tuple(entry for entry in self._store.entries if entry.withdraws is None)
         answer = self._choose(Situation(attempts, tuple(views), measurements, estimate))
         if isinstance(answer, Step):
@@ -187,15 +195,48 @@ class Session:
         return entry
 
     def _no_measurements(self) -> Measurements:
-        return Measurements.of(self._store.recording.mounting, self._cell.camera, self._cell.target)
+        return Measurements.of(self._store.begun_with.mounting, self._cell.camera, self._cell.target)
 
-    def _with(self, views: list[View]) -> Measurements:
-        """Return the measurements of these views; those measured before are not measured again."""
+    def _with(self, views: Sequence[View], teaching: Sequence[View] | None = None) -> Measurements:
+        """Return the measurements of these views; those measured before are not measured again.
+
+        Where no camera was given, through the one that the views teach, or that of `teaching`.
+        """
+        if self._learning is not None:
+            camera = self._learning.camera(views if teaching is None else teaching)
+            empty = replace(self._measurements, views=(), poses=(), rejected={})
+            return empty if camera is None else replace(empty, camera=camera).with_views(views)
         known = {view.name for view in self._measurements.views} | set(self._measurements.rejected)
         if known - {view.name for view in views}:  # withdrawn
             self._measurements, known = self._no_measurements(), set[str]()
         self._measurements = self._measurements.with_views(view for view in views if view.name not in known)
         return self._measurements
+
+    def _planned_from(self, views: list[View]) -> tuple[Measurements, Estimate | None]:
+        """Return what to plan from: one wrong view would make all the others look uncertain.
+
+        Mistakes are looked for only where a view stands out: where all agree there are none to be found, and
+        the end of the session looks for them in any case.
+        """
+        measurements = self._with(views)
+        if len(measurements) < START_VIEWS:
+            return measurements, None
+        estimate = self._estimator(measurements)
+        if len(measurements) < FEWEST_EXAMINED or all_agree(measurements, estimate):
+            return measurements, estimate
+        try:
+            measurements = self._examined(measurements).measurements
+        except InputError:
+            return measurements, estimate  # Shared by all of them; said at the end.
+        return measurements, self._estimator(measurements) if len(measurements) >= START_VIEWS else None
+
+    def _examined(self, measurements: Measurements) -> Examination:
+        """Look for mistakes; a camera that the views teach is found again without those that are wrong."""
+        examination = examine(measurements)
+        kept = examination.measurements.views
+        if self._learning is None or len(kept) == len(measurements):
+            return examination
+        return examine(self._with(measurements.views, kept))
 
     def end(self) -> End:
         """End here, because somebody says so, with the answer from the views so far."""
@@ -207,11 +248,11 @@ class Session:
         left_out = [view.name for view in views_of(entries) if view not in views]
         if left_out:
             sentence += f"; without {', '.join(left_out)}, whose joint positions are not those of the arm"
-        calibration, radii, estimate = None, None, None
+        calibration, radii, estimate, lens_px = None, None, None, None
         measurements = self._with(views)
         if len(measurements) >= START_VIEWS:
             try:
-                examination = examine(measurements)
+                examination = self._examined(measurements)
             except InputError as error:
                 if reason not in FAILED:
                     raise
@@ -221,14 +262,5 @@ class Session:
             if estimate.determined:
                 calibration = calibrate_examined(examination, self._wish.model, kinematics=self._kinematics)
                 radii = estimate.within_95
-        return End(reason, sentence, calibration, radii, len(views), len(entries), estimate)
-
-
-def _without_mistakes(measurements: Measurements) -> Measurements:
-    """Return what is left to plan from: one wrong view would make all the others look uncertain."""
-    if len(measurements) < FEWEST_EXAMINED:
-        return measurements
-    try:
-        return examine(measurements).measurements
-    except InputError:
-        return measurements  # Shared by all of them; said at the end.
+                lens_px = None if self._learning is None else lens_within_px(estimate)
+        return End(reason, sentence, calibration, radii, len(views), len(entries), estimate, lens_px)

@@ -19,7 +19,7 @@ from handeye.robots.simulated import ArmErrors
 from handeye.session.attempt import Patience
 from handeye.session.drivers import MANUAL, REPLAY
 from handeye.session.faults import FaultRates
-from handeye.session.simulated import usual_errors
+from handeye.session.simulated import ORDINARY, usual_errors
 from handeye.session.starting import Start
 from handeye.session.wish import Wish
 from handeye.types import Mounting, Pose, View
@@ -49,6 +49,7 @@ class Simulation:
     occluded_share: float = 0.0
     points_only: float | None = None
     camera_error: float = 1.0
+    lens: str = ORDINARY
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,14 @@ class Configuration:
         Corners of the box that no motion may leave; None only for a simulated cell.
     collisions
         What links are judged by; once a session has begun it is no longer `auto`.
+    camera_known
+        Whether the camera is calibrated; if not, the views teach it too.
+    lens
+        Of a camera that is not; None to have the views choose.
+    accuracy_px
+        How well such a camera is to be known, see `Wish`.
     touch_mm, work
         Touch error to reach in place of the accuracy, and what is seen and touched.
-    start_rad
-        Joints to start from, for an arm that is simulated; others start where they stand.
     """
 
     robot: str | None
@@ -90,6 +95,9 @@ class Configuration:
     collisions: Collisions = Collisions.AUTO
     limits: ViewLimits = field(default_factory=ViewLimits)
     patience: Patience = field(default_factory=Patience)
+    camera_known: bool = True
+    lens: str | None = None
+    accuracy_px: float = 1.0
     simulation: Simulation = field(default_factory=Simulation)
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
@@ -122,6 +130,7 @@ class Configuration:
             joints_err=self.joints_err,
             refine=self.refine,
             policy=make_policy(self.policy),
+            accuracy_px=None if self.camera_known else self.accuracy_px,
             touch_mm=self.touch_mm,
             work=self.work,
         )

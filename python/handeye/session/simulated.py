@@ -6,7 +6,7 @@ import numpy as np
 
 from handeye.cameras.protocol import ImageSource
 from handeye.cameras.simulated import Optics, SimulatedCamera
-from handeye.errors import SolveError
+from handeye.errors import InputError, SolveError
 from handeye.planning.collisions import Body, Workspace
 from handeye.robots import Arm
 from handeye.robots.protocol import Robot
@@ -17,10 +17,19 @@ from handeye.session.starting import Start
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Target, Truth
 
 SIZE_PX = (1280, 1024)
-LENS = "brown_conrady_5"
-PARAMETERS = (1400.0, 1400.0, 640.0, 512.0, -0.1, 0.05, 0.0005, -0.0005, 0.0)
+ORDINARY = "ordinary"
+# Lenses and their parameters: a field of view of 49, 79 and 141 degrees.
+LENSES = {
+    ORDINARY: ("brown_conrady_5", (1400.0, 1400.0, 640.0, 512.0, -0.1, 0.05, 0.0005, -0.0005, 0.0)),
+    "wide": ("brown_conrady_5", (780.0, 780.0, 634.0, 517.0, -0.22, 0.06, -0.0004, 0.0006, -0.008)),
+    "fisheye": ("kannala_brandt", (520.0, 520.0, 645.0, 508.0, -0.02, 0.004, -0.002, 0.0003)),
+}
 # Deviations of a good calibration of the camera: focal lengths and centre in px, coefficients.
-PARAMETER_SIGMAS = (0.5, 0.5, 0.5, 0.5, 5e-4, 2e-3, 5e-5, 5e-5, 2e-3)
+_CENTRE_SIGMAS = (0.5, 0.5, 0.5, 0.5)
+PARAMETER_SIGMAS = {
+    "brown_conrady_5": (*_CENTRE_SIGMAS, 5e-4, 2e-3, 5e-5, 5e-5, 2e-3),
+    "kannala_brandt": (*_CENTRE_SIGMAS, 2e-4, 2e-4, 1e-4, 5e-5),
+}
 
 
 def usual_errors() -> ArmErrors:
@@ -45,6 +54,8 @@ class SimulationOptions:
         Factor on the deviations of the camera's calibration; 0 for a calibration that is exact.
     target
         What is looked at.
+    lens
+        One of `LENSES`.
     """
 
     seed: int = 0
@@ -54,6 +65,7 @@ class SimulationOptions:
     optics: Optics = field(default_factory=Optics)
     faults: FaultRates | None = None
     camera_error: float = 1.0
+    lens: str = ORDINARY
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +77,7 @@ class SimulatedCell:
     recording: Recording
     truth: Truth
     hidden_arm: SimulatedArm
+    true_camera: Camera
 
 
 def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> SimulatedCell:
@@ -82,9 +95,11 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
     random = np.random.default_rng([options.seed, 0])
     workspace = surrounding(arm)
     T_base_flange, joints = looking_down(arm, workspace)
-    known = Camera(LENS, PARAMETERS, *SIZE_PX, covariance=np.diag(np.square(PARAMETER_SIGMAS)))
-    off = options.camera_error * np.array(PARAMETER_SIGMAS) * random.standard_normal(len(PARAMETERS))
-    true_camera = Camera(LENS, np.array(PARAMETERS) + off, *SIZE_PX)
+    lens, parameters = _lens(options.lens)
+    sigmas = np.array(PARAMETER_SIGMAS[lens])
+    known = Camera(lens, parameters, *SIZE_PX, covariance=np.diag(np.square(sigmas)))
+    off = options.camera_error * sigmas * random.standard_normal(len(parameters))
+    true_camera = Camera(lens, np.array(parameters) + off, *SIZE_PX)
     truth = _mounted(random, options, T_base_flange)
     robot = SimulatedArm(arm, options.errors, options.seed, joints)
     X, Y = truth.X or Pose.identity(), truth.Y or Pose.identity()
@@ -109,7 +124,13 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
         None,
         "simulated cell",
     )
-    return SimulatedCell(cell, Start(T_base_flange, joints), recording, truth, robot)
+    return SimulatedCell(cell, Start(T_base_flange, joints), recording, truth, robot, true_camera)
+
+
+def _lens(name: str) -> tuple[str, tuple[float, ...]]:
+    if name not in LENSES:
+        raise InputError(f"lens {name!r}, expected one of {', '.join(LENSES)}", code="unknown_lens")
+    return LENSES[name]
 
 
 def surrounding(arm: Arm) -> Workspace:

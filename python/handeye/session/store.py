@@ -32,6 +32,7 @@ from handeye.session.journal import (
     read_journal,
     read_settings,
 )
+from handeye.session.self_calibration import SelfCalibration, same_camera
 from handeye.types import Recording, Truth, View
 
 RECORDING_FILE = "recording.toml"
@@ -40,7 +41,8 @@ RECORDING_FILE = "recording.toml"
 class SessionStore:
     """The folder of one session, open for one process at a time.
 
-    Use `create_session` or `open_session`; close it at the end.
+    Use `create_session` or `open_session`; close it at the end. `begun_with` is the recording before its
+    first view, and `self_calibration` finds the camera where none was given.
     """
 
     def __init__(
@@ -50,9 +52,13 @@ class SessionStore:
         recording: Recording,
         journal: Journal,
         lock: IO[bytes],
+        begun_with: Recording,
+        self_calibration: SelfCalibration | None = None,
     ) -> None:
         self.folder = folder
         self.settings = settings
+        self.begun_with = begun_with
+        self.self_calibration = self_calibration
         self._recording = recording
         self._journal = journal
         self._lock = lock
@@ -61,6 +67,16 @@ class SessionStore:
     def entries(self) -> tuple[Entry, ...]:
         """All attempts so far, in order."""
         return self._journal.entries
+
+    @property
+    def notice(self) -> str | None:
+        """What is to be said of how the journal was found; None for nothing."""
+        if not self._journal.torn:
+            return None
+        return (
+            f"{self.folder / JOURNAL_FILE}: the last line was not written to its end ({self._journal.torn} "
+            f"bytes) and is left out; {len(self.entries)} attempts are whole, and the session goes on there"
+        )
 
     @property
     def recording(self) -> Recording:
@@ -119,7 +135,8 @@ class SessionStore:
         OutputError
             The system refuses to write.
         """
-        self._recording = self._recording.with_views(views_of(self.entries))
+        grown = self._recording.with_views(views_of(self.entries))
+        self._recording = grown if self.self_calibration is None else self.self_calibration.put_into(grown)
         write_recording(self._recording, self.folder, replace=True)
 
 
@@ -156,11 +173,11 @@ def open_session(folder: Path) -> SessionStore:
     try:
         # Everything is compared before anything is written.
         journal = read_journal(root, settings)
-        recording, current = _recording_of(root, settings, journal)
+        begun_with, recording, current, learning = _recording_of(root, settings, journal)
         journal.mend()
         for part in (root, root / "corners", root / "images"):
             remove_partials(part)
-        store = SessionStore(root, settings.asked, recording, journal, lock)
+        store = SessionStore(root, settings.asked, recording, journal, lock, begun_with, learning)
         if not current:
             store.bring_up_to_date()
     except BaseException:
@@ -174,8 +191,12 @@ def is_session(folder: Path) -> bool:
     return is_file(folder / SETTINGS_FILE) and is_file(folder / JOURNAL_FILE)
 
 
-def _recording_of(root: Path, settings: Settings, journal: Journal) -> tuple[Recording, bool]:
-    """Return the recording that follows from the journal, and whether it is what lies on the disk.
+def _recording_of(
+    root: Path, settings: Settings, journal: Journal
+) -> tuple[Recording, Recording, bool, SelfCalibration | None]:
+    """Return the recording as it began, as it follows from the journal, and whether that lies on the disk.
+
+    Last what finds the camera, where none was given.
 
     Raises
     ------
@@ -186,21 +207,28 @@ def _recording_of(root: Path, settings: Settings, journal: Journal) -> tuple[Rec
     taken = [entry.view for entry in journal.entries if entry.view is not None]
     base = None if settings.recording is None else Recording.from_dict(settings.recording)
     path = root / RECORDING_FILE
+    learning = None if base is None else SelfCalibration.of_session(settings.asked, base)
+
+    def grown(begun_with: Recording) -> Recording:
+        recording = begun_with.with_views(views)
+        return recording if learning is None else learning.put_into(recording)
+
     if base is not None and not path.exists() and not path.is_symlink():
         write_empty_recording(base, root)
-        return base.with_views(views), False
+        return base, grown(base), False, learning
     found = read_views_apart(root)
     if base is None:
         base = found.recording
-    _check_same(path, base, found, taken)
-    recording = base.with_views(views)
+    _check_same(path, base, found, taken, learning)
     current = list(found.views) == [view.name for view in views] and not any(
         isinstance(view, InputError) for view in found.views.values()
     )
-    return recording, current
+    return base, grown(base), current, learning
 
 
-def _check_same(path: Path, base: Recording, found: ViewsApart, views: list[View]) -> None:
+def _check_same(
+    path: Path, base: Recording, found: ViewsApart, views: list[View], learning: SelfCalibration | None
+) -> None:
     """Refuse a recording that holds what the journal lacks.
 
     Raises
@@ -217,7 +245,12 @@ def _check_same(path: Path, base: Recording, found: ViewsApart, views: list[View
             code="journal_cut",
             hint=f"restore {JOURNAL_FILE} from a copy; handeye solve uses the recording as it is",
         )
-    if found.recording.to_dict() != base.to_dict():
+    kept = found.recording
+    if learning is not None:
+        then = learning.put_into(base.with_views(known[name] for name in found.views)).camera
+        if same_camera(kept.camera, then):
+            kept = replace(kept, camera=base.camera)
+    if kept.to_dict() != base.to_dict():
         raise InputError(
             f"{path}: name, source, mounting, camera or target are not those that the session began with",
             code="edited",

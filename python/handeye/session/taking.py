@@ -12,7 +12,7 @@ from handeye.session.deciding import Step
 from handeye.session.entry import Entry, Failure
 from handeye.session.judging import foreseen, labeled, objection, unchanged
 from handeye.session.store import SessionStore
-from handeye.types import View
+from handeye.types import Camera, View
 
 _WRITE_PAUSE_S = 0.2
 
@@ -34,7 +34,7 @@ class Taker:
         """
         timings = {"decide": step.seconds}
         digests = frozenset(e.image_digest for e in self._store.entries if e.image_digest is not None)
-        foresee = partial(foreseen, self._cell.camera, self._cell.target, step.estimate)
+        foresee = partial(foreseen, self._camera(step.estimate), self._cell.target, step.estimate)
         outcome = attempt(self._cell, step.goal, digests, timings, foresee, step.estimate)
         if isinstance(outcome, Seen):
             outcome = self._judged(step, outcome)
@@ -92,23 +92,32 @@ class Taker:
         if unchanged(view, self._store.recording.views):
             why = "the target did not move in the picture, though the arm did"
             return Missed(Failure.STALE_IMAGE, why, moved=True, digest=seen.digest, standing=seen.reading)
-        why = objection(cell.camera, cell.target, view, estimate, len(self._store.recording.views))
+        taken, learning = self._store.recording.views, self._store.self_calibration
+        # A view that a young lens does not fit may be right, and the lens wrong: it is asked with the view.
+        camera = cell.camera if learning is None else learning.camera((*taken, view))
+        why = objection(camera, cell.target, view, estimate, len(taken))
         if why is not None:
             return Missed(Failure.INCONSISTENT, why, moved=True, digest=seen.digest, standing=seen.reading)
         return view, seen
 
+    def _camera(self, estimate: Estimate | None) -> Camera:
+        """Return the camera as it was given, or as the views teach it where none was."""
+        if self._store.self_calibration is None or estimate is None:
+            return self._cell.camera
+        return estimate.camera
+
     def _labels(self, seen: Seen, estimate: Estimate | None) -> Detection:
-        cell = self._cell
+        cell, camera = self._cell, self._camera(estimate)
         views = self._store.recording.views
         if estimate is not None:
             A = estimate.mounting.chain(seen.reading.T_base_flange)
             expected = estimate.X @ A @ estimate.Y
         elif views:
             # The first moves turn little: the board looks as it did at first.
-            expected = view_pose(cell.camera, cell.target, views[0]).T_camera_target
+            expected = view_pose(camera, cell.target, views[0]).T_camera_target
         else:
             return seen.detection
-        return labeled(cell.camera, cell.target, seen.detection, seen.reading.T_base_flange, expected)
+        return labeled(camera, cell.target, seen.detection, seen.reading.T_base_flange, expected)
 
     def _write(self, entry: Entry, image: bytes | None) -> None:
         """Write an attempt down; where the disk refuses, wait and ask again before giving up."""

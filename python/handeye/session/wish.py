@@ -40,6 +40,8 @@ class Wish:
         What is seen and touched.
     refine
         Climb from the best candidates to better ones near them, rather than take the best that was drawn.
+    accuracy_px
+        Where the views teach the camera too: how well, see `Requested`. None for a calibrated camera.
 
     Raises
     ------
@@ -58,6 +60,7 @@ class Wish:
     joints_err: bool = True
     refine: bool = True
     policy: Policy = field(default_factory=NextBestView)
+    accuracy_px: float | None = None
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
 
@@ -75,7 +78,7 @@ class Wish:
             return TouchAccuracy(self.work, self.touch_mm), number
         if self.accuracy_mm is None or self.accuracy_deg is None:
             return (number,)
-        return Requested(self.accuracy_mm, self.accuracy_deg), number
+        return Requested(self.accuracy_mm, self.accuracy_deg, self.accuracy_px), number
 
     def criterion(self, estimate: Estimate, measurements: Measurements) -> _core.Criterion:
         """Return what a view is worth now: what it takes off the touch error, where that is asked for."""

@@ -6,7 +6,7 @@ which the arm does not move. The errors are those of `handeye.simulation.cells`.
 """
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -99,7 +99,7 @@ def simulate_rig(
     random = np.random.default_rng([seed, zlib.crc32(f"rig {kind.value}".encode()), number])
     arm = simulated_arm()
     rig = draw_rig(random, options)
-    joints = _stations(random, arm, rig, options)
+    joints = draw_stations(random, arm, rig, options)
     if kind in MIXTURES:
         reported, read = arm.forward(joints), joints
         flanges = draw_mixed(random, kind, arm).stand(random, joints)
@@ -195,6 +195,17 @@ class SimulatedRig:
         return pixels
 
 
+def chance_of(seed: int, label: str) -> np.random.Generator:
+    """Return the chance of what is seen under a label: the same after a break."""
+    return np.random.default_rng([seed, 12, zlib.crc32(label.encode())])
+
+
+def seen_targets(rig: SimulatedRig, cameras: Sequence[str]) -> tuple[str, ...]:
+    """Return the boards that move against these cameras."""
+    bodies = {rig.given[name].body for name in cameras}
+    return tuple(name for name, board in BOARDS.items() if bodies - {board.body})
+
+
 def draw_rig(random: np.random.Generator, options: RigOptions) -> SimulatedRig:
     """Draw cameras and boards."""
     names = [*HAND_NAMES[: options.on_flange], *BESIDE_NAMES[: options.beside]]
@@ -251,7 +262,9 @@ def _uncentred(target: Target) -> Pose:
     return Pose.exp([*(-target.points.mean(axis=0)), 0, 0, 0])
 
 
-def _stations(random: np.random.Generator, arm: Arm, rig: SimulatedRig, options: RigOptions) -> FloatArray:
+def draw_stations(
+    random: np.random.Generator, arm: Arm, rig: SimulatedRig, options: RigOptions
+) -> FloatArray:
     """Draw joint angles (K, n) at which enough cameras see a board that moves against them."""
     leading = next(iter(rig.given))
     target = TABLE if rig.given[leading].body is Body.FLANGE else TOOL

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from handeye.datasets.images import read_image
 from handeye.robots import open_arm
 from handeye.session.deciding import START_VIEWS
-from handeye.session.simulated import LENS, PARAMETERS, SIZE_PX, SimulationOptions
+from handeye.session.simulated import LENSES, ORDINARY, SIZE_PX, SimulationOptions
 from handeye.studies.cell_picture import (
     Eye,
     draw_arm,
@@ -48,7 +48,7 @@ def closed_loop_figure(shown: ClosedLoop) -> Figure:
 def _cell(axis: Axes, shown: ClosedLoop) -> None:
     eye, arm = Eye(), open_arm(shown.options.robot)
     kept = shown.shown
-    camera = Camera(LENS, PARAMETERS, *SIZE_PX)
+    camera = Camera(*LENSES[ORDINARY], *SIZE_PX)
     target = SimulationOptions().target
     poses = {policy: camera_poses(drives[0]) for policy, drives in shown.drives.items()}
     ground = np.array([pose.translation[:2] for some in poses.values() for pose in some] + [[-0.1, 0.0]])

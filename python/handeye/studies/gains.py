@@ -18,7 +18,7 @@ from handeye.estimation import Estimate, Measurements, make_estimator
 from handeye.planning import Candidate
 from handeye.planning.prediction import Sight, gains
 from handeye.studies.measured_cell import MeasuredCell, measured_cell
-from handeye.studies.policies import ARMS, draw_start
+from handeye.studies.policies import ARMS, start_of
 from handeye.types import Mounting
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
@@ -137,7 +137,7 @@ class _Job:
 def _run(job: _Job) -> GainScatter:
     size = 3 + job.candidates + HELD_OUT
     cell = measured_cell(job.number, job.mounting, ARMS[job.arm], pool_size=size, seed=job.seed)
-    start, pool = draw_start(cell, job.number, job.seed)
+    start, pool = start_of(cell, job.number, job.seed)
     offered, held_out = pool.candidates[: job.candidates], pool.candidates[job.candidates :]
     estimator = make_estimator(job.model, cell.kinematics if job.model is ModelName.AUTO else None)
     measured = _taken(cell, start, 0)

@@ -57,7 +57,7 @@ class MeasuredCell:
         """Take the view of a posture as the `step`-th: noise depends on step and draw, not on the posture.
 
         So all policies meet the same noise. Another draw is the same cell with another arm of the same kind:
-        its constant errors are noise too, to whoever plans.
+        its constant errors are noise too, to the planner.
         """
         home = self.recording.views[0].joints_rad or ()
         arm = SimulatedArm(simulated_arm(), self.errors, self.seed + draw, home)

@@ -208,8 +208,8 @@ def study_policies(
     wanted = (OURS, *(policy for policy in policies if policy != OURS))
     jobs = [
         _Job(number, mounting, arm, tuple(budgets), wanted, seed)
-        for mounting in mountings
         for number in range(trials)
+        for mounting in mountings
     ]
     done = run_all(_run, jobs, workers=workers, progress=progress)
     reached: dict[tuple[Mounting, int], dict[str, tuple[Reached, ...]]] = {}
@@ -232,7 +232,7 @@ class _Job:
 
 def _run(job: _Job) -> dict[tuple[int, str], Reached]:
     cell = measured_cell(job.number, job.mounting, ARMS[job.arm], seed=job.seed)
-    start, pool = draw_start(cell, job.number, job.seed)
+    start, pool = start_of(cell, job.number, job.seed)
     found: dict[tuple[int, str], Reached] = {}
     for policy in job.policies:
         for budget, taken in _choices(policy, cell, start, pool, job).items():
@@ -258,16 +258,20 @@ def _choices(
     return {budget: most[: budget - len(start)] for budget in job.budgets}
 
 
-def draw_start(cell: MeasuredCell, number: int, seed: int) -> tuple[tuple[Candidate, ...], Pool]:
-    """Draw three views that turn about two axes, and return them and the pool of the others."""
-    pool = Pool.of_views(cell.recording.views)
-    random = trial_random(seed, f"start {cell.recording.mounting}", number)
+def draw_start(pool: Pool, random: np.random.Generator) -> tuple[tuple[Candidate, ...], Pool]:
+    """Draw three candidates that turn about two axes, and return them and the pool of the others."""
     while True:
         picked = random.choice(len(pool), START_VIEWS, replace=False)
         start = tuple(pool.candidates[int(i)] for i in picked)
         turns: FloatArray = np.array([one.T_base_flange.matrix for one in start])
         if second_turn_rad(turns) > SMALLEST_TURN_RAD:
             return start, pool.without([one.name for one in start])
+
+
+def start_of(cell: MeasuredCell, number: int, seed: int) -> tuple[tuple[Candidate, ...], Pool]:
+    """Return the start of a cell that all policies share, and the pool of its other candidates."""
+    random = trial_random(seed, f"start {cell.recording.mounting}", number)
+    return draw_start(Pool.of_views(cell.recording.views), random)
 
 
 def _reached(estimate: Estimate, cell: MeasuredCell, views: int) -> Reached:

@@ -163,7 +163,7 @@ def _shifted(
     name = estimate.arm.kinematics.joint_names[joint]
     columns = rows_of(estimate, views).shifts[Moved.JOINT, name].reshape(-1, 6)
     lever = float(np.sqrt(np.mean(np.sum(columns[:, :3] ** 2, axis=1))))
-    zeros[joint] = size_m / lever * random.choice([-1.0, 1.0])
+    zeros[joint] = size_m / lever * (1.0 if random.uniform() < 0.5 else -1.0)
     return cell, zeros, name
 
 

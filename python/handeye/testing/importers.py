@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from handeye.datasets import ImageSet, Importer, ImportOptions, PosePairs, UnreadPoses
+from handeye.datasets import Imported, Importer, ImportOptions
 from handeye.errors import InputError
 
 
@@ -26,7 +26,7 @@ class ImporterTests:
         assert importer.name.strip()
         assert importer.looks_like.strip()
         assert importer.recognises(layout)
-        assert isinstance(importer.read(layout, options), ImageSet | UnreadPoses | PosePairs)
+        assert isinstance(importer.read(layout, options), Imported)
 
     def test_leaves_others_alone(self, importer: Importer, tmp_path: Path) -> None:
         """What is empty, missing or something else is not recognised, and raises nothing."""

@@ -15,20 +15,14 @@ from handeye.errors import InputError
 from handeye.types.arrays import LARGEST, FloatArray, count, finite_array
 from handeye.types.plain import Document, read_document, without_none
 
-_K = ("fx", "fy", "cx", "cy")
-_RADIAL_AND_TANGENTIAL = ("k1", "k2", "p1", "p2")
-
 # Parameters of each lens in order; distortion in the order of OpenCV. Focal lengths and centre in pixels.
 LENSES: Mapping[str, tuple[str, ...]] = {
-    "pinhole": _K,
-    "brown_conrady_4": (*_K, *_RADIAL_AND_TANGENTIAL),
-    "brown_conrady_5": (*_K, *_RADIAL_AND_TANGENTIAL, "k3"),
-    "brown_conrady_8": (*_K, *_RADIAL_AND_TANGENTIAL, "k3", "k4", "k5", "k6"),
-    "brown_conrady_12": (*_K, *_RADIAL_AND_TANGENTIAL, "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"),
-    "kannala_brandt": (*_K, "k1", "k2", "k3", "k4"),
+    name: ("fx", "fy", "cx", "cy", *coefficients) for name, coefficients in _core.lenses()
 }
 _LENS_OF_COEFFICIENTS = {0: "pinhole", 4: "brown_conrady_4", 5: "brown_conrady_5", 8: "brown_conrady_8"}
 _LENS_OF_COEFFICIENTS[12] = "brown_conrady_12"
+# Lenses that OpenCV has too, parameters in its order.
+OPENCV_LENSES = frozenset({*_LENS_OF_COEFFICIENTS.values(), "kannala_brandt"})
 # OpenCV's fourteen: the twelve and the two angles of a tilted sensor.
 _TILTED = 14
 MAX_IMAGE_SIDE_PX = 100_000

@@ -15,8 +15,8 @@ from handeye.errors import InputError
 from handeye.estimation import Estimate
 from handeye.robots.protocol import Goal, Reading
 from handeye.session import End, Entry, Observer, SessionStore, Step
-from handeye.session.configuration import Prepared
 from handeye.session.entry import views_of
+from handeye.session.prepared import Prepared
 from handeye.types import View
 from handeye.ui import documents
 from handeye.ui.documents import Picture, Shown

@@ -5,8 +5,8 @@ from dataclasses import replace
 from handeye.errors import DeviceError, InputError
 from handeye.robots.protocol import Goal
 from handeye.session import End, Session, SessionStore, Step
-from handeye.session.configuration import Prepared
 from handeye.session.contract import check_at_rest
+from handeye.session.prepared import Prepared
 from handeye.types.plain import Document, read_document
 from handeye.ui.dashboard import Dashboard
 from handeye.ui.hub import Command, Hub

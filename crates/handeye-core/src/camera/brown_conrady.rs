@@ -12,9 +12,58 @@
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 
 use super::distortion::DistortedPoint;
-use super::lens::Parameters;
+use super::lens_model::{Model, ParameterJacobian, Parameters};
 use super::region::{self, MAX_SQUARED_RADIUS};
-use crate::simd::{Simd, Vector};
+use crate::simd::{Scalar, Simd, Vector};
+
+pub(super) const MODEL_4: Model = Model {
+    name: "brown_conrady_4",
+    coefficients: &["k1", "k2", "p1", "p2"],
+    max_squared_radius,
+    distort: |p, x, y| distort::<_, false, false>(Scalar, p, x, y),
+    differentiate: |_, at, lens, out| differentiate(8, at, lens, out),
+    undistort,
+};
+pub(super) const MODEL_5: Model = Model {
+    name: "brown_conrady_5",
+    coefficients: &["k1", "k2", "p1", "p2", "k3"],
+    differentiate: |_, at, lens, out| differentiate(9, at, lens, out),
+    ..MODEL_4
+};
+pub(super) const MODEL_8: Model = Model {
+    name: "brown_conrady_8",
+    coefficients: &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"],
+    distort: |p, x, y| distort::<_, true, false>(Scalar, p, x, y),
+    differentiate: |_, at, lens, out| differentiate(12, at, lens, out),
+    ..MODEL_4
+};
+pub(super) const MODEL_12: Model = Model {
+    name: "brown_conrady_12",
+    coefficients: &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"],
+    distort: |p, x, y| distort::<_, true, true>(Scalar, p, x, y),
+    differentiate: |_, at, lens, out| differentiate(16, at, lens, out),
+    ..MODEL_4
+};
+
+fn differentiate(
+    parameters: usize,
+    (x, y): (f64, f64),
+    lens: &DistortedPoint<f64>,
+    out: &mut ParameterJacobian,
+) {
+    for i in 4..parameters {
+        (out[(0, i)], out[(1, i)]) = coefficient_derivative(Scalar, i, x, y, lens);
+    }
+}
+
+fn undistort(p: &Parameters, max_squared_radius: f64, at: (f64, f64)) -> Option<(f64, f64)> {
+    let start = undistort_radially(p, max_squared_radius, at.0, at.1);
+    region::undistort(start, at, |x, y| {
+        // Coefficients that a lens does not have are zero.
+        let lens = distort::<_, true, true>(Scalar, p, x, y);
+        (x * x + y * y <= max_squared_radius && lens.determinant() > 0.0).then_some(lens)
+    })
+}
 
 /// Coefficients of the numerator `N` and denominator `D`, lowest power first.
 #[inline]
@@ -113,7 +162,7 @@ pub(crate) fn coefficient_derivative<S: Simd>(
 /// of decentring and prism have a spectral norm of at most `r (6 |(p1, p2)| + 2 |(s1, s3)| + 4 s |(s2, s4)|)`. Where
 /// that stays below both eigenvalues the sum is positive definite, and a map whose Jacobian is so on a convex region
 /// is one-to-one there.
-pub(super) fn max_squared_radius(p: &Parameters) -> f64 {
+fn max_squared_radius(p: &Parameters) -> f64 {
     let (n, d) = fraction(p);
     let mut rising = [0.0; 7];
     for (i, a) in n.iter().enumerate() {
@@ -145,7 +194,7 @@ fn radial_factors(n: &[f64; 4], d: &[f64; 4], s: f64) -> (f64, f64) {
 }
 
 /// The point before the lens if it were purely radial: the start for Newton's method.
-pub(super) fn undistort_radially(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> (f64, f64) {
+fn undistort_radially(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> (f64, f64) {
     let target = u.hypot(v);
     if target == 0.0 {
         return (0.0, 0.0);

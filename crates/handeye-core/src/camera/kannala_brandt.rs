@@ -5,8 +5,17 @@
 //! `(x', y') = (x, y) theta_d / r`, `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`.
 
 use super::distortion::DistortedPoint;
-use super::lens::{ParameterJacobian, Parameters};
+use super::lens_model::{Model, ParameterJacobian, Parameters};
 use super::region::{self, MAX_SQUARED_RADIUS};
+
+pub(super) const MODEL: Model = Model {
+    name: "kannala_brandt",
+    coefficients: &["k1", "k2", "k3", "k4"],
+    max_squared_radius,
+    distort,
+    differentiate: |_, (x, y), _, out| coefficients(x, y, out),
+    undistort,
+};
 
 /// Below this squared radius the quotients in `r` are replaced by their series.
 const SMALL: f64 = 1e-8;
@@ -23,7 +32,7 @@ fn distorted_angle(p: &Parameters, theta: f64) -> (f64, f64) {
 }
 
 #[inline]
-pub(super) fn distort(p: &Parameters, x: f64, y: f64) -> DistortedPoint<f64> {
+fn distort(p: &Parameters, x: f64, y: f64) -> DistortedPoint<f64> {
     let s = x * x + y * y;
     let (scale, slope) = if s < SMALL {
         let second = p[4] - 1.0 / 3.0;
@@ -50,7 +59,7 @@ pub(super) fn distort(p: &Parameters, x: f64, y: f64) -> DistortedPoint<f64> {
 
 /// Derivative of the point after the lens in `k1..k4`: columns 4 to 7 of `out`.
 #[inline]
-pub(super) fn coefficients(x: f64, y: f64, out: &mut ParameterJacobian) {
+fn coefficients(x: f64, y: f64, out: &mut ParameterJacobian) {
     let r = (x * x + y * y).sqrt();
     let theta = r.atan();
     let mut factor = if r * r < SMALL { 1.0 } else { theta / r };
@@ -62,7 +71,7 @@ pub(super) fn coefficients(x: f64, y: f64, out: &mut ParameterJacobian) {
 }
 
 /// Squared radius up to which `theta_d` rises.
-pub(super) fn max_squared_radius(p: &Parameters) -> f64 {
+fn max_squared_radius(p: &Parameters) -> f64 {
     let limit = MAX_SQUARED_RADIUS.sqrt().atan();
     let rising = [1.0, 3.0 * p[4], 5.0 * p[5], 7.0 * p[6], 9.0 * p[7]];
     let theta = region::first_root(&rising, limit * limit).sqrt();
@@ -70,7 +79,7 @@ pub(super) fn max_squared_radius(p: &Parameters) -> f64 {
 }
 
 /// The point before the lens; None beyond the largest angle.
-pub(super) fn undistort(p: &Parameters, max_squared_radius: f64, u: f64, v: f64) -> Option<(f64, f64)> {
+fn undistort(p: &Parameters, max_squared_radius: f64, (u, v): (f64, f64)) -> Option<(f64, f64)> {
     let target = u.hypot(v);
     let limit = max_squared_radius.sqrt().atan();
     if target > distorted_angle(p, limit).0 {

@@ -1,19 +1,10 @@
-//! The families of lenses and how many parameters each has.
+//! The list of the lenses.
 
-use nalgebra::SMatrix;
-
+use super::lens_model::Model;
+use super::{brown_conrady, division, kannala_brandt, pinhole};
 use crate::error::Error;
 
-/// Most parameters a lens can have (Brown-Conrady with 12 coefficients).
-pub const MAX_PARAMETERS: usize = 16;
-
-/// Derivative of a pixel in the camera parameters; columns beyond the lens' count are zero.
-pub type ParameterJacobian = SMatrix<f64, 2, MAX_PARAMETERS>;
-
-/// Parameters of a camera, padded with zeros.
-pub(super) type Parameters = [f64; MAX_PARAMETERS];
-
-/// The lens models, parameters in OpenCV's order after `fx, fy, cx, cy`.
+/// The lens models; those of Brown and Conrady have their parameters in OpenCV's order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lens {
     /// No distortion: 4 parameters.
@@ -28,41 +19,54 @@ pub enum Lens {
     BrownConrady12,
     /// Equidistant fisheye `k1 k2 k3 k4`: 8 parameters (Kannala-Brandt 2006).
     KannalaBrandt,
+    /// Division model `k1`: 5 parameters (Fitzgibbon 2001).
+    Division,
 }
 
 impl Lens {
     /// All lenses.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Pinhole,
         Self::BrownConrady4,
         Self::BrownConrady5,
         Self::BrownConrady8,
         Self::BrownConrady12,
         Self::KannalaBrandt,
+        Self::Division,
     ];
+
+    #[inline]
+    pub(super) const fn model(self) -> &'static Model {
+        match self {
+            Self::Pinhole => &pinhole::MODEL,
+            Self::BrownConrady4 => &brown_conrady::MODEL_4,
+            Self::BrownConrady5 => &brown_conrady::MODEL_5,
+            Self::BrownConrady8 => &brown_conrady::MODEL_8,
+            Self::BrownConrady12 => &brown_conrady::MODEL_12,
+            Self::KannalaBrandt => &kannala_brandt::MODEL,
+            Self::Division => &division::MODEL,
+        }
+    }
 
     /// Number of parameters, focal lengths and principal point included.
     #[inline]
     pub const fn parameter_count(self) -> usize {
-        match self {
-            Self::Pinhole => 4,
-            Self::BrownConrady4 | Self::KannalaBrandt => 8,
-            Self::BrownConrady5 => 9,
-            Self::BrownConrady8 => 12,
-            Self::BrownConrady12 => 16,
-        }
+        4 + self.model().coefficients.len()
+    }
+
+    /// Names of the coefficients, in the order of the parameters after `fx, fy, cx, cy`.
+    pub const fn coefficients(self) -> &'static [&'static str] {
+        self.model().coefficients
     }
 
     /// The name in files and messages.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Pinhole => "pinhole",
-            Self::BrownConrady4 => "brown_conrady_4",
-            Self::BrownConrady5 => "brown_conrady_5",
-            Self::BrownConrady8 => "brown_conrady_8",
-            Self::BrownConrady12 => "brown_conrady_12",
-            Self::KannalaBrandt => "kannala_brandt",
-        }
+        self.model().name
+    }
+
+    /// Whether kernels that take many points at once know the lens: the pinhole and the family of Brown and Conrady.
+    pub(crate) const fn in_lanes(self) -> bool {
+        !matches!(self, Self::KannalaBrandt | Self::Division)
     }
 
     /// The lens of a name.

@@ -7,22 +7,25 @@
 mod brown_conrady;
 mod circle;
 mod distortion;
+mod division;
 mod feature;
 mod kannala_brandt;
 mod lens;
+mod lens_model;
 mod observation;
+mod pinhole;
 mod projection_row;
 mod region;
 
 use nalgebra::{Matrix2x3, Matrix2x6, Vector2, Vector3};
 
 use crate::error::Error;
-use crate::simd::Scalar;
 
 pub(crate) use brown_conrady::{coefficient_derivative, distort};
 pub(crate) use distortion::DistortedPoint;
 pub use feature::Feature;
-pub use lens::{Lens, MAX_PARAMETERS, ParameterJacobian};
+pub use lens::Lens;
+pub use lens_model::{MAX_PARAMETERS, ParameterJacobian};
 pub use observation::Observation;
 pub(crate) use projection_row::{projection_row, restore_signs};
 
@@ -86,11 +89,7 @@ impl Camera {
                 padded[0], padded[1]
             )));
         }
-        let max_squared_radius = match lens {
-            Lens::Pinhole => region::MAX_SQUARED_RADIUS,
-            Lens::KannalaBrandt => kannala_brandt::max_squared_radius(&padded),
-            _ => brown_conrady::max_squared_radius(&padded),
-        };
+        let max_squared_radius = (lens.model().max_squared_radius)(&padded);
         Ok(Self { lens, parameters: padded, max_squared_radius })
     }
 
@@ -117,13 +116,7 @@ impl Camera {
         let p = &self.parameters;
         // Written so that NaN falls through to None.
         if x * x + y * y <= self.max_squared_radius {
-            let distorted = match self.lens {
-                Lens::Pinhole => return Some(DistortedPoint::unchanged(Scalar, x, y)),
-                Lens::BrownConrady4 | Lens::BrownConrady5 => distort::<_, false, false>(Scalar, p, x, y),
-                Lens::BrownConrady8 => distort::<_, true, false>(Scalar, p, x, y),
-                Lens::BrownConrady12 => distort::<_, true, true>(Scalar, p, x, y),
-                Lens::KannalaBrandt => kannala_brandt::distort(p, x, y),
-            };
+            let distorted = (self.lens.model().distort)(p, x, y);
             // On the very edge rounding can make it singular, next to a pole NaN.
             if distorted.determinant() > 0.0 {
                 return Some(distorted);
@@ -140,12 +133,7 @@ impl Camera {
         distorted: &DistortedPoint<f64>,
         out: &mut ParameterJacobian,
     ) {
-        if self.lens == Lens::KannalaBrandt {
-            return kannala_brandt::coefficients(x, y, out);
-        }
-        for i in 4..self.lens.parameter_count() {
-            (out[(0, i)], out[(1, i)]) = coefficient_derivative(Scalar, i, x, y, distorted);
-        }
+        (self.lens.model().differentiate)(&self.parameters, (x, y), distorted, out);
     }
 
     /// Focal lengths and principal point applied to a point after the lens.
@@ -223,14 +211,7 @@ impl Camera {
         if !(u.is_finite() && v.is_finite()) {
             return None;
         }
-        let (x, y) = match self.lens {
-            Lens::Pinhole => (u, v),
-            Lens::KannalaBrandt => kannala_brandt::undistort(p, self.max_squared_radius, u, v)?,
-            _ => {
-                let start = brown_conrady::undistort_radially(p, self.max_squared_radius, u, v);
-                region::undistort(start, (u, v), |x, y| self.distort(x, y))?
-            }
-        };
+        let (x, y) = (self.lens.model().undistort)(p, self.max_squared_radius, (u, v))?;
         let norm_squared = x * x + y * y;
         // Written so that NaN falls through to None.
         if norm_squared <= self.max_squared_radius {

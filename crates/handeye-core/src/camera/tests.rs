@@ -10,7 +10,11 @@ use crate::testing::numerical_jacobian;
 pub(super) fn camera(lens: Lens, strength: f64) -> Camera {
     let brown = [-0.28, 0.11, 1.2e-3, -0.8e-3, -0.02, 0.05, -0.03, 0.01, 2e-3, -1e-3, -1.5e-3, 0.7e-3];
     let fisheye = [0.06, -0.02, 0.008, -0.002];
-    let coefficients: &[f64] = if lens == Lens::KannalaBrandt { &fisheye } else { &brown };
+    let coefficients: &[f64] = match lens {
+        Lens::KannalaBrandt => &fisheye,
+        Lens::Division => &[-0.2],
+        _ => &brown,
+    };
     let count = lens.parameter_count();
     let mut parameters = vec![1400.0, 1390.0, 640.0, 480.0];
     parameters.extend(coefficients[..count - 4].iter().map(|k| k * strength));

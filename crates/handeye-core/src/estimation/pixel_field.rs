@@ -35,6 +35,7 @@ pub(super) fn slow_residuals(
     camera: &Camera,
     pose: &Se3,
     parameters: Option<&PixelParameters>,
+    weights: Option<&[f64]>,
 ) -> SlowResiduals {
     let samples = problem.samples(k);
     let free: &[usize] = parameters.map_or(&[], |p| &p.camera);
@@ -48,7 +49,7 @@ pub(super) fn slow_residuals(
     let width = (columns + 1).next_multiple_of(MAX_LANES);
     let mut rows = vec![0.0; 2 * samples.len() * width];
     let points = features.iter().zip(&problem.pixels()[samples]);
-    for ((feature, pixel), row) in points.zip(rows.chunks_exact_mut(2 * width)) {
+    for (n, ((feature, pixel), row)) in points.zip(rows.chunks_exact_mut(2 * width)).enumerate() {
         let Some(seen) = camera.observe_with_derivatives(pose, feature) else {
             return SlowResiduals::default();
         };
@@ -68,6 +69,12 @@ pub(super) fn slow_residuals(
                 }
             }
             row[columns] = pixel[axis] - seen.pixel[axis];
+            if let Some(weights) = weights {
+                let root = weights[n].sqrt();
+                for entry in row.iter_mut() {
+                    *entry *= root;
+                }
+            }
         }
     }
     let size = (columns + 1).next_multiple_of(TOGETHER);

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 use super::pixel_field::{SlowResiduals, slow_residuals};
 use crate::camera::Camera;
 use crate::error::Error;
-use crate::least_squares::{PixelParameters, Problem, view_block};
+use crate::least_squares::{PixelParameters, Problem, ViewBlock, view_block};
 use crate::se3::Se3;
 
 /// A view reduced to the pose that fits its image best.
@@ -32,9 +32,35 @@ pub struct PoseMeasurement {
     pub degrees_of_freedom: f64,
     /// The slow part of the residual.
     pub slow: SlowResiduals,
+    /// Whether somebody else's detector measured it, whose error has levels of its own.
+    pub is_foreign: bool,
 }
 
-/// Compresses a view at the pose that fits its image.
+impl PoseMeasurement {
+    /// A pose without pixels, as somebody else's detector states it: `covariance` is that of its left perturbation.
+    pub fn stated(motion: Se3, pose: Se3, covariance: Matrix6<f64>) -> Self {
+        Self {
+            motion,
+            pose,
+            covariance,
+            sensitivity: Matrix6xX::zeros(0),
+            camera_information: DMatrix::zeros(0, 0),
+            camera_gradient: DVector::zeros(0),
+            variance_px2: 1.0,
+            degrees_of_freedom: 0.0,
+            slow: SlowResiduals::default(),
+            is_foreign: true,
+        }
+    }
+}
+
+/// Weights of the points of a view by their deviations, of mean one: what they say of each other, not of the view.
+pub fn relative_weights(sigmas_px: &[f64]) -> Vec<f64> {
+    let mean = sigmas_px.iter().map(|s| s.powi(-2)).sum::<f64>() / sigmas_px.len() as f64;
+    sigmas_px.iter().map(|s| s.powi(-2) / mean).collect()
+}
+
+/// Compresses a view at the pose that fits its image; where points are weighted, at the pose that fits them so.
 ///
 /// # Errors
 /// [`Error::Numerical`] if a point is out of sight at the pose, [`Error::Degenerate`] if its points determine none.
@@ -44,15 +70,27 @@ pub fn compress(
     camera: &Camera,
     pose: &Se3,
     parameters: Option<&PixelParameters>,
+    weights: Option<&[f64]>,
 ) -> Result<PoseMeasurement, Error> {
-    let block = view_block(problem, k, camera, pose, 1.0, parameters).ok_or_else(|| {
-        Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
-    })?;
-    let covariance = block
-        .m
-        .cholesky()
-        .ok_or_else(|| Error::degenerate(format!("view {k}: its points do not determine the target's pose")))?
-        .inverse();
+    let block_at = |pose: &Se3, parameters| {
+        view_block(problem, k, camera, pose, 1.0, parameters, weights).ok_or_else(|| {
+            Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
+        })
+    };
+    let inverse = |block: &ViewBlock| {
+        let factor = block.m.cholesky().ok_or_else(|| {
+            Error::degenerate(format!("view {k}: its points do not determine the target's pose"))
+        })?;
+        Ok::<_, Error>(factor.inverse())
+    };
+    let mut pose = *pose;
+    if weights.is_some() {
+        // The pose fits points that weigh alike; from there one step of Newton's is within rounding of the other.
+        let block = block_at(&pose, None)?;
+        pose = Se3::exp(&-(inverse(&block)? * block.g)) * pose;
+    }
+    let block = block_at(&pose, parameters)?;
+    let covariance = inverse(&block)?;
     let (sensitivity, camera_information, camera_gradient) = match &block.columns {
         None => (Matrix6xX::zeros(0), DMatrix::zeros(0, 0), DVector::zeros(0)),
         Some(c) => {
@@ -66,14 +104,15 @@ pub fn compress(
     let degrees_of_freedom = (2 * problem.point_count(k)) as f64 - 6.0;
     Ok(PoseMeasurement {
         motion: *problem.motion(k),
-        pose: *pose,
+        pose,
         covariance,
         sensitivity,
         camera_information,
         camera_gradient,
         variance_px2: block.squared_px / degrees_of_freedom.max(1.0),
         degrees_of_freedom,
-        slow: slow_residuals(problem, k, camera, pose, parameters),
+        slow: slow_residuals(problem, k, camera, &pose, parameters, weights),
+        is_foreign: false,
     })
 }
 

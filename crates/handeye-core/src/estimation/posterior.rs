@@ -10,6 +10,7 @@ use super::mixed::{Evaluation, Mixed, Wanted};
 use super::nodes;
 use super::weak_prior::WeakPrior;
 use crate::error::Error;
+use crate::interrupt;
 use crate::se3::Se3;
 
 /// How an estimate is made.
@@ -136,8 +137,9 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
         Some(found) => found,
         None => find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()))?,
     };
-    let nodes = average(&mixed, &found, options.pairs)?;
-    gather(cell, &guess, &mixed, nodes, &found, (rounds, steps, converged && found.at_rest))
+    let (nodes, at_mode) = average(&mixed, &found, options.pairs)?;
+    let come = (rounds, steps, converged && found.at_rest);
+    gather(cell, &guess, &mixed, (nodes, at_mode), &found, come)
 }
 
 fn assemble(cell: &Cell, guess: &Guess, components: &[Box<dyn Component>], weak: &WeakPrior) -> Mixed {
@@ -188,6 +190,7 @@ fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Error> {
     let mut at_rest = false;
     let mut steps = 0;
     while steps < MOST_STEPS && !at_rest {
+        interrupt::check();
         steps += 1;
         let mut taken = false;
         for _ in 0..8 {
@@ -231,8 +234,8 @@ fn damped_step(now: &Evaluation, damping: f64) -> DVector<f64> {
     step
 }
 
-/// The nodes with their shares.
-fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<Vec<Node>, Error> {
+/// The nodes with their shares, and the answer at the mode, the first of them.
+fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<(Vec<Node>, Evaluation), Error> {
     let points = nodes::around(&mode.t, &mode.curvature, pairs);
     let mut answers: Vec<Option<Evaluation>> = points.iter().map(|_| None).collect();
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -248,6 +251,7 @@ fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<Vec<Node>, Error>
     });
     let mut nodes = Vec::new();
     let mut logs = Vec::new();
+    let mut at_mode = None;
     for ((t, density), answer) in points.into_iter().zip(answers) {
         // Levels at which the model is singular have no share.
         let Some(answer) = answer else { continue };
@@ -258,6 +262,7 @@ fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<Vec<Node>, Error>
             theta: answer.theta.rows(0, mixed.told).into_owned(),
             covariance: answer.covariance.view((0, 0), (mixed.told, mixed.told)).into_owned(),
         });
+        at_mode.get_or_insert(answer);
     }
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if !most.is_finite() {
@@ -267,7 +272,7 @@ fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<Vec<Node>, Error>
     for (node, log) in nodes.iter_mut().zip(&logs) {
         node.weight = (log - most).exp() / total;
     }
-    Ok(nodes)
+    Ok((nodes, at_mode.ok_or_else(singular)?))
 }
 
 /// Fewest degrees of freedom: below, regions would have no useful quantile.
@@ -277,7 +282,7 @@ fn gather(
     cell: &Cell,
     guess: &Guess,
     mixed: &Mixed,
-    nodes: Vec<Node>,
+    (nodes, at_mode): (Vec<Node>, Evaluation),
     mode: &Mode,
     (rounds, steps, converged): (usize, usize, bool),
 ) -> Result<Posterior, Error> {
@@ -299,7 +304,7 @@ fn gather(
     let moved = guess.moved(theta.as_slice());
     let poses = 6 * (cell.cameras.len() + cell.targets.len());
     theta.rows_mut(0, poses).fill(0.0);
-    let attribution = attribution(mixed, mode)?;
+    let attribution = attribution(mixed, mode, &at_mode.theta)?;
     let of_robot: Vec<&str> =
         attribution.iter().map(|a| a.name).filter(|n| components::is_of_robot(n)).collect();
     let without = mixed.value_without(&of_robot, &mode.t).ok_or_else(singular)?;
@@ -315,16 +320,15 @@ fn gather(
         value: mode.value,
         attribution,
         robot_loss: without - mode.value,
-        information: mixed.information(&mode.t).ok_or_else(singular)?,
+        information: at_mode.information,
         rounds,
         steps,
         converged,
     })
 }
 
-fn attribution(mixed: &Mixed, mode: &Mode) -> Result<Vec<Attribution>, Error> {
-    let theta = mixed.evaluate(&mode.t, Wanted::Answer).ok_or_else(singular)?.theta;
-    let misfit = mixed.misfit(&mode.t, &theta).ok_or_else(singular)?;
+fn attribution(mixed: &Mixed, mode: &Mode, theta: &DVector<f64>) -> Result<Vec<Attribution>, Error> {
+    let misfit = mixed.misfit(&mode.t, theta).ok_or_else(singular)?;
     misfit
         .into_iter()
         .map(|(name, misfit)| {

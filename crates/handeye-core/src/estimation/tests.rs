@@ -55,6 +55,7 @@ fn made(seed: u64, bodies: (&[Body], &[Body]), stations: usize, flange: f64, des
                     camera: c,
                     target: t,
                     pose: PoseMeasurement {
+                        is_foreign: false,
                         motion: reported,
                         pose: Se3::identity(),
                         covariance: Matrix6::identity() * (PIXELS * PIXELS),

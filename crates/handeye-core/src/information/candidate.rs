@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, Matrix4, Matrix6, Vector2};
 
-use super::belief::{Belief, CHAIN};
+use super::belief::CHAIN;
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
+use crate::interrupt;
 use crate::least_squares::{Moments, PixelColumns, PixelParameters, ViewBlock, marginalised};
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
@@ -41,17 +42,6 @@ pub struct CandidateModel<'a> {
     pub kinematic_count: usize,
     /// What must be seen.
     pub visibility: Visibility,
-}
-
-/// What may be so of the robot's error, and what is believed then.
-#[derive(Clone, Debug)]
-pub struct Supposition<'a> {
-    /// Its share in a mean.
-    pub weight: f64,
-    /// What is believed.
-    pub belief: &'a Belief,
-    /// As [`CandidateModel::robot`].
-    pub robot: RobotError,
 }
 
 /// A candidate's information `F F'` in all global parameters.
@@ -99,6 +89,63 @@ pub struct CandidateJoints {
     /// Square root of the covariance that noise of the joints gives `A` on its left, `6 x n`; beside the model's robot
     /// error.
     pub noise_root: Option<DMatrix<f64>>,
+}
+
+/// [`CandidateJoints`] of many candidates, one after another: 6 x n matrices, row by row.
+#[derive(Clone, Copy, Debug)]
+pub struct ArmColumns<'a> {
+    /// Columns of the arm's constant errors.
+    pub constants: &'a [f64],
+    /// Square roots of the covariance of the noise of the joints; nothing where it has none.
+    pub noise: &'a [f64],
+    /// Columns of the constants, and of the noise, of each candidate.
+    pub counts: (usize, usize),
+}
+
+impl ArmColumns<'_> {
+    /// Of candidate `i`.
+    pub fn of(&self, i: usize) -> CandidateJoints {
+        let matrix = |entries: &[f64], count: usize| {
+            DMatrix::from_row_slice(6, count, &entries[6 * count * i..6 * count * (i + 1)])
+        };
+        let (constants, noise) = self.counts;
+        CandidateJoints {
+            constants: matrix(self.constants, constants),
+            noise_root: (noise > 0).then(|| matrix(self.noise, noise)),
+        }
+    }
+
+    /// Of `count` candidates from `first` on.
+    pub(super) fn part(&self, first: usize, count: usize) -> Self {
+        let part = |entries, columns: usize| -> &[f64] {
+            let entries: &[f64] = entries;
+            &entries[6 * columns * first..6 * columns * (first + count)]
+        };
+        Self {
+            constants: part(self.constants, self.counts.0),
+            noise: part(self.noise, self.counts.1),
+            counts: self.counts,
+        }
+    }
+
+    /// Whether these are the columns of so many candidates with so many constants.
+    fn fits(&self, candidates: usize, constants: usize) -> bool {
+        let (of_constants, of_noise) = self.counts;
+        of_constants == constants
+            && self.constants.len() == 6 * constants * candidates
+            && self.noise.len() == 6 * of_noise * candidates
+    }
+
+    /// # Errors
+    /// [`Error::InvalidInput`] if they are not.
+    pub(super) fn check(&self, candidates: usize, constants: usize) -> Result<(), Error> {
+        if self.fits(candidates, constants) {
+            return Ok(());
+        }
+        Err(Error::invalid(format!(
+            "expected the arm of {candidates} candidates with {constants} constants each"
+        )))
+    }
 }
 
 /// Information of a view, being summed.
@@ -206,6 +253,7 @@ impl CandidateModel<'_> {
 
     /// The candidate at robot motion `A`. Without `joints` its kinematic parameters, if there are any, move nothing.
     pub fn candidate(&self, motion: &Se3, joints: Option<&CandidateJoints>) -> Option<Candidate> {
+        interrupt::check();
         let (block, seen) = self.block(motion, joints)?;
         let extra = block.columns.as_ref().map_or(0, |c| c.gc.len());
         let n = self.parameter_count();
@@ -295,7 +343,7 @@ impl Default for Execution {
 }
 
 /// Candidates below which waking a second thread costs more than it brings.
-const CANDIDATES_PER_THREAD: usize = 10_000;
+const CANDIDATES_PER_THREAD: usize = 2_500;
 
 impl Execution {
     pub(super) fn threads_for(&self, candidates: usize) -> usize {

@@ -1,9 +1,11 @@
 //! What candidates gain by a criterion: by the scorer where it knows the criterion, one by one otherwise.
 
+use nalgebra::DMatrix;
+
 use super::belief::Belief;
-use super::candidate::{CandidateJoints, CandidateModel, Execution, Motions, Supposition};
+use super::candidate::{ArmColumns, CandidateModel, Execution, Motions};
 use super::criteria::Criterion;
-use super::scorer::Scorer;
+use super::scorer::{Scorer, in_sight};
 use crate::error::Error;
 use crate::se3::Se3;
 
@@ -18,95 +20,76 @@ impl CandidateModel<'_> {
         criterion: &dyn Criterion,
         motions: &[Se3],
     ) -> Result<Vec<f64>, Error> {
-        self.gains_by(belief, criterion, Motions::Transforms(motions), &Execution::default())
+        self.gains_by(belief, criterion, Motions::Transforms(motions), None, &Execution::default())
     }
 
-    /// As [`CandidateModel::gains`], of motions in either form and with a say in how the machine is used.
+    /// As [`CandidateModel::gains`], of motions in either form, of an arm whose joints and links err where its columns
+    /// are given, and with a say in how the machine is used.
     ///
     /// # Errors
-    /// As [`CandidateModel::gains`], and [`Error::NotRigid`] if a matrix is no rigid transform.
+    /// As [`CandidateModel::gains`], [`Error::NotRigid`] if a matrix is no rigid transform, and
+    /// [`Error::InvalidInput`] if the arm is not that of these candidates.
     pub fn gains_by(
         &self,
         belief: &Belief,
         criterion: &dyn Criterion,
         motions: Motions<'_>,
+        arm: Option<ArmColumns<'_>>,
         execution: &Execution,
     ) -> Result<Vec<f64>, Error> {
-        let supposed = Supposition { weight: 1.0, belief, robot: self.robot };
-        self.mean_gains(&[supposed], criterion, motions, execution)
+        if belief.len() != self.parameter_count() {
+            return Err(Error::invalid(format!(
+                "the belief has {} parameters, the candidates {}",
+                belief.len(),
+                self.parameter_count()
+            )));
+        }
+        if let Some(arm) = &arm {
+            arm.check(motions.len(), self.kinematic_count)?;
+        }
+        let prepared = criterion.prepare(belief)?;
+        if let Some(quantity) = criterion.quantity() {
+            let mut gains = vec![0.0; motions.len()];
+            let scorer = Scorer::new(self, execution.unit, (belief, &quantity, prepared), arm.as_ref())?;
+            scorer.score(motions, arm, execution, &mut gains)?;
+            return Ok(gains);
+        }
+        (0..motions.len())
+            .map(|i| {
+                let joints = arm.as_ref().map(|arm| arm.of(i));
+                let candidate = self.candidate(&motions.get(i)?, joints.as_ref());
+                Ok(candidate.map_or(f64::NAN, |c| prepared.gain(&c.factor)))
+            })
+            .collect()
     }
 
-    /// As [`CandidateModel::gains_by`], averaged over what may be supposed of the robot in place of the model's; the
-    /// points of a candidate are looked at once.
+    /// Information of each candidate in all parameters; zero where too little would be in sight.
     ///
     /// # Errors
     /// As [`CandidateModel::gains_by`].
-    pub fn mean_gains(
+    pub fn informations(
         &self,
-        supposed: &[Supposition<'_>],
-        criterion: &dyn Criterion,
         motions: Motions<'_>,
-        execution: &Execution,
-    ) -> Result<Vec<f64>, Error> {
-        let mut gains = vec![0.0; motions.len()];
-        if let Some(quantity) = criterion.quantity() {
-            let mut scorer = Scorer::new(self, execution.unit);
-            for one in supposed {
-                self.check(one.belief)?;
-                let prepared = criterion.prepare(one.belief)?;
-                scorer.add_goal(one.weight, one.belief, &one.robot, &quantity, prepared)?;
-            }
-            scorer.score(motions, execution, &mut gains)?;
-            return Ok(gains);
+        arm: Option<ArmColumns<'_>>,
+    ) -> Result<Vec<DMatrix<f64>>, Error> {
+        if let Some(arm) = &arm {
+            arm.check(motions.len(), self.kinematic_count)?;
         }
-        for one in supposed {
-            self.check(one.belief)?;
-            let model = Self { robot: one.robot, ..self.clone() };
-            let prepared = criterion.prepare(one.belief)?;
-            for (i, gain) in gains.iter_mut().enumerate() {
-                let candidate = model.candidate(&motions.get(i)?, None);
-                *gain += one.weight * candidate.map_or(f64::NAN, |c| prepared.gain(&c.factor));
-            }
-        }
-        Ok(gains)
+        let n = self.parameter_count();
+        (0..motions.len())
+            .map(|i| {
+                let joints = arm.as_ref().map(|arm| arm.of(i));
+                let candidate = self.candidate(&motions.get(i)?, joints.as_ref());
+                Ok(candidate.map_or_else(|| DMatrix::zeros(n, n), |c| &c.factor * c.factor.transpose()))
+            })
+            .collect()
     }
 
-    /// As [`CandidateModel::gains`], of an arm whose joints err: one [`CandidateJoints`] per motion.
+    /// Which motions would show enough of the target.
     ///
     /// # Errors
-    /// As [`CandidateModel::gains`], and if there are not as many or not with as many offsets.
-    pub fn gains_with_joints(
-        &self,
-        belief: &Belief,
-        criterion: &dyn Criterion,
-        motions: &[Se3],
-        joints: &[CandidateJoints],
-    ) -> Result<Vec<f64>, Error> {
-        self.check(belief)?;
-        if joints.len() != motions.len() || joints.iter().any(|j| j.constants.ncols() != self.kinematic_count)
-        {
-            return Err(Error::invalid(format!(
-                "expected joints of {} motions with {} free offsets each",
-                motions.len(),
-                self.kinematic_count
-            )));
-        }
-        let prepared = criterion.prepare(belief)?;
-        let gain = |(motion, joints)| {
-            self.candidate(motion, Some(joints))
-                .map_or(f64::NAN, |candidate| prepared.gain(&candidate.factor))
-        };
-        Ok(motions.iter().zip(joints).map(gain).collect())
-    }
-
-    fn check(&self, belief: &Belief) -> Result<(), Error> {
-        if belief.len() == self.parameter_count() {
-            return Ok(());
-        }
-        Err(Error::invalid(format!(
-            "the belief has {} parameters, the candidates {}",
-            belief.len(),
-            self.parameter_count()
-        )))
+    /// [`Error::NotRigid`] if a matrix is no rigid transform.
+    pub fn in_sight(&self, motions: Motions<'_>, execution: &Execution) -> Result<Vec<bool>, Error> {
+        in_sight(self, motions, execution)
     }
 }

@@ -12,5 +12,5 @@ mod scorer;
 pub use belief::{Belief, entropy};
 pub(crate) use candidate::semidefinite_root;
 pub use candidate::{
-    Candidate, CandidateJoints, CandidateModel, Execution, Motions, RobotError, Supposition, Visibility,
+    ArmColumns, Candidate, CandidateJoints, CandidateModel, Execution, Motions, RobotError, Visibility,
 };

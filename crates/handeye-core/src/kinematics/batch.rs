@@ -2,6 +2,8 @@
 
 #![expect(clippy::inline_always, reason = "the kernel exists only inside the entry point of its unit")]
 
+use nalgebra::Vector6;
+
 use super::chain::{Chain, JointKind, MAX_JOINTS};
 use crate::error::Error;
 use crate::se3::Se3;
@@ -71,6 +73,42 @@ impl Chain {
             for (row, entries) in out.chunks_exact_mut(n).enumerate() {
                 for (entry, column) in entries.iter_mut().zip(&columns) {
                     *entry = column[row];
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Twists of the flange where joints sit displaced on the link before them, as row-major 6 x m matrices, one after
+    /// another: column `w` for `ways[w]`, a joint and its twist in its own frame before it moves.
+    ///
+    /// # Errors
+    /// As [`Chain::forward_all`], and for a joint that the chain does not have.
+    pub fn displacements_all(
+        &self,
+        frame: Frame,
+        q: &[f64],
+        ways: &[(usize, Vector6<f64>)],
+        out: &mut [f64],
+    ) -> Result<(), Error> {
+        let count = self.check(q)?;
+        let m = ways.len();
+        if out.len() != count * 6 * m || ways.iter().any(|(joint, _)| *joint >= self.len()) {
+            return Err(Error::invalid(format!("{count} matrices of 6 x {m} for joints of this chain")));
+        }
+        if m == 0 {
+            return Ok(());
+        }
+        for (q, out) in q.chunks_exact(self.len()).zip(out.chunks_exact_mut(6 * m)) {
+            let (flange, places) = self.places(q);
+            let back = match frame {
+                Frame::Base => Se3::identity(),
+                Frame::Flange => flange.inverse(),
+            };
+            for (w, (joint, twist)) in ways.iter().enumerate() {
+                let column = (back * places[*joint]).adjoint() * twist;
+                for (row, entry) in column.iter().enumerate() {
+                    out[row * m + w] = *entry;
                 }
             }
         }

@@ -39,6 +39,8 @@ pub struct Chain {
     tip: Se3,
     /// From the axis-aligned frame before joint `i` to that of joint `i`; one more for the flange.
     pub(super) links: Vec<Se3>,
+    /// From each joint's own frame to the one whose z is its axis.
+    pub(super) turns: Vec<Se3>,
 }
 
 impl Chain {
@@ -74,14 +76,16 @@ impl Chain {
             return Err(Error::invalid("the pose of the flange is not finite"));
         }
         let mut links = Vec::with_capacity(joints.len() + 1);
+        let mut turns = Vec::with_capacity(joints.len());
         let mut back = Se3::identity();
         for joint in &joints {
             let turn = Se3::new(turn_to(&joint.axis), Vector3::zeros());
             links.push(back * joint.placement * turn);
             back = turn.inverse();
+            turns.push(back);
         }
         links.push(back * tip);
-        Ok(Self { joints, tip, links })
+        Ok(Self { joints, tip, links, turns })
     }
 
     /// The joints, base first.

@@ -55,6 +55,18 @@ impl Chain {
         (flange, columns)
     }
 
+    /// `T_base_flange`, and for each joint what carries twists of its own frame, before it moves, to the base.
+    pub(super) fn places(&self, q: &[f64]) -> (Se3, [Se3; MAX_JOINTS]) {
+        let mut places = [Se3::identity(); MAX_JOINTS];
+        let mut t = self.links[0];
+        for (i, joint) in self.joints().iter().enumerate() {
+            places[i] = t * self.turns[i];
+            move_joint(&mut t, joint.kind, q[i]);
+            t = t * self.links[i + 1];
+        }
+        (t, places)
+    }
+
     /// The flange, and in base coordinates a point on and the direction of every joint's axis.
     pub(super) fn axes(&self, q: &[f64]) -> (Se3, [Vector3<f64>; MAX_JOINTS], [Vector3<f64>; MAX_JOINTS]) {
         let mut places = [Vector3::zeros(); MAX_JOINTS];

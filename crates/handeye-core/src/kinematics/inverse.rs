@@ -9,6 +9,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::chain::{Chain, JointKind, MAX_JOINTS};
 use crate::error::Error;
+use crate::interrupt;
 use crate::se3::{Se3, so3_log};
 
 /// How hard to try.
@@ -82,6 +83,7 @@ impl Chain {
         q[..self.len()].copy_from_slice(&start[..self.len()]);
         let mut nearest: Option<Run> = None;
         for attempt in 0..options.attempts.max(1) {
+            interrupt::check();
             if attempt > 0 {
                 q = self.spread_start(attempt);
             }
@@ -104,6 +106,7 @@ impl Chain {
     pub fn inverse_all(&self, goal: &Se3, options: &InverseOptions) -> Vec<Vec<f64>> {
         let mut found: Vec<Vec<f64>> = Vec::new();
         for attempt in 1..=options.attempts {
+            interrupt::check();
             let run = self.descend(goal, self.spread_start(attempt), options);
             let q = &run.q[..self.len()];
             if run.reached && !found.iter().any(|other| self.same_posture(other, q)) {

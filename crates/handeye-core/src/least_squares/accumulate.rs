@@ -90,7 +90,8 @@ impl Moments {
     }
 }
 
-/// The quadratic of view `k` of `problem` at `pose = T_camera_target`, noise `sigma` px.
+/// The quadratic of view `k` of `problem` at `pose = T_camera_target`, noise `sigma` px; of points that are not equally
+/// good each with its weight beside.
 ///
 /// `None` where a point cannot be seen (behind the camera, outside the lens' valid region).
 pub fn view_block(
@@ -100,13 +101,17 @@ pub fn view_block(
     pose: &Se3,
     sigma: f64,
     pixel_parameters: Option<&PixelParameters>,
+    weights: Option<&[f64]>,
 ) -> Option<ViewBlock> {
     let range = problem.samples(k);
-    let weight = 1.0 / (sigma * sigma);
+    let of_view = 1.0 / (sigma * sigma);
     let mut moments = Moments::new();
     let mut columns = pixel_parameters.map(|p| (p, PixelColumns::zeros(p.count())));
     let mut squared_px = 0.0;
-    for (feature, pixel) in problem.features()[range.clone()].iter().zip(&problem.pixels()[range]) {
+    let points = problem.features()[range.clone()].iter().zip(&problem.pixels()[range]);
+    for (i, (feature, pixel)) in points.enumerate() {
+        let relative = weights.map_or(1.0, |weights| weights[i]);
+        let weight = of_view * relative;
         let residual;
         if let Some((parameters, columns)) = &mut columns {
             let seen = camera.observe_with_derivatives(pose, feature)?;
@@ -118,7 +123,7 @@ pub fn view_block(
             residual = predicted - pixel;
             moments.add(&d_twist, &residual, weight);
         }
-        squared_px += residual.norm_squared();
+        squared_px += relative * residual.norm_squared();
     }
     if !squared_px.is_finite() {
         return None;

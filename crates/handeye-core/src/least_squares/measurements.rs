@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use crate::batched_algebra::set_lane;
-use crate::camera::{Camera, Feature, Lens};
+use crate::camera::{Camera, Feature};
 use crate::se3::{Se3, entries};
 use crate::simd::MAX_LANES;
 
@@ -58,8 +58,7 @@ impl Measurements {
     /// Views split into as many parts as run fastest; None for circles and fisheyes, which have no batched engine.
     pub fn new(camera: &Camera, views: &[View<'_>]) -> Option<Self> {
         let is_circle = |feature: &Feature| feature.radius != 0.0;
-        if camera.lens == Lens::KannalaBrandt || views.iter().any(|view| view.features.iter().any(is_circle))
-        {
+        if !camera.lens.in_lanes() || views.iter().any(|view| view.features.iter().any(is_circle)) {
             return None;
         }
         let longest = views.iter().map(|view| view.pixels.len()).max().unwrap_or(0);

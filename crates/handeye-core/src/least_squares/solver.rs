@@ -10,6 +10,7 @@ use super::problem::{MIN_VIEWS, Problem};
 use super::report::{Ending, Solution};
 use super::view_by_view::ViewByView;
 use crate::error::Error;
+use crate::interrupt;
 use crate::simd::VectorUnit;
 
 /// First damping, and the smallest factor by which a step that went as predicted lowers it. More damping than needed
@@ -56,6 +57,7 @@ pub(super) fn iterate(engine: &mut dyn Engine, options: &Options, samples: usize
         if iterations == options.max_iterations {
             break Ending::OutOfIterations;
         }
+        interrupt::check();
         iterations += 1;
         let Some(Proposal { predicted, largest }) = engine.propose(damping) else {
             damping = (damping * growth).max(1e-12);

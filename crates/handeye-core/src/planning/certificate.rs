@@ -14,6 +14,7 @@ use super::pool::Pool;
 use super::reweigh::reweigh;
 use super::selection::check;
 use crate::error::Error;
+use crate::interrupt;
 use crate::simd::VectorUnit;
 
 /// An upper bound on what any choice can reach.
@@ -60,6 +61,7 @@ pub fn certify(
     let mut done = 0;
     let mut lean = Vec::new();
     for _ in 0..iterations.max(1) {
+        interrupt::check();
         done += 1;
         relaxed = relaxed.max(here.value);
         pool.lean(&here.gradient, &mut lean);

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 use super::objective::Objective;
 use super::pool::Pool;
 use crate::error::Error;
+use crate::interrupt;
 use crate::simd::VectorUnit;
 
 /// A choice of views and its worth.
@@ -87,6 +88,7 @@ fn from_first(
     let mut total = base + pool.information(first);
     let mut greedy = vec![alone];
     for _ in 1..k {
+        interrupt::check();
         let (index, value) = best_addition(&total, pool, &indices, objective, &mut worth)?;
         total += pool.information(index);
         indices.push(index);
@@ -102,6 +104,7 @@ fn from_first(
         }
         let before = swaps;
         for slot in 0..k {
+            interrupt::check();
             let without = &total - pool.information(indices[slot]);
             if let Some((index, better)) = best_addition(&without, pool, &indices, objective, &mut worth)
                 && is_better(better, value)

@@ -4,6 +4,7 @@ mod arm;
 mod assumptions;
 mod board;
 mod camera;
+mod detector;
 mod joint_noise;
 mod joint_offsets;
 mod links;
@@ -31,6 +32,9 @@ pub(super) fn all(cell: &Cell, assumptions: &Assumptions) -> Result<Vec<Box<dyn 
     if cell.board_scale {
         all.push(Box::new(board::BoardScale));
     }
+    if let Some(detector) = detector::Detector::of(cell) {
+        all.push(Box::new(detector));
+    }
     if assumptions.exact_robot {
         return Ok(all);
     }
@@ -52,5 +56,5 @@ pub(super) fn all(cell: &Cell, assumptions: &Assumptions) -> Result<Vec<Box<dyn 
 
 /// Whether a component is an error of the robot.
 pub(super) fn is_of_robot(name: &str) -> bool {
-    !matches!(name, "camera" | "board_scale" | "time_lag")
+    !matches!(name, "camera" | "board_scale" | "detector" | "time_lag")
 }

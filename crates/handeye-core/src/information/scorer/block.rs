@@ -52,6 +52,10 @@ pub(super) struct Block {
     pub pose: Transforms,
     /// Information of `[eta; c]`, upper triangle row by row, up to a factor common to all candidates.
     pub information: Rows,
+    /// What constants of the arm move in the camera frame, 6 rows for each, and beside them its noise.
+    pub arm: Rows,
+    /// How many of either.
+    pub arm_counts: (usize, usize),
     /// Features in sight.
     pub seen: Row,
     /// `|I + M S|`.
@@ -61,13 +65,15 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// For informations of `size` rows.
-    pub fn new(size: usize) -> Self {
+    /// For informations of `size` rows, and so many constants of the arm and columns of its noise.
+    pub fn new(size: usize, arm_counts: (usize, usize)) -> Self {
         const ZERO: Row = [0.0; BLOCK];
         Self {
             before_y: [ZERO; 12],
             pose: [ZERO; 12],
             information: Rows::new(size * (size + 1) / 2),
+            arm: Rows::new(6 * (arm_counts.0 + arm_counts.1)),
+            arm_counts,
             seen: ZERO,
             with: ZERO,
             without: ZERO,

@@ -12,6 +12,10 @@
 //! so that an entropy gain is half the logarithm of a quotient of two determinants, and what a view takes off a
 //! covariance needs no `N_eff`. `S` is written as `constant + U U'` with `U = [K + C G; K_c]` and `G G'` the covariance
 //! of `xi_y`: where `xi_x` and `C xi_y` cancel, as they do in a good calibration, they cancel before they are squared.
+//!
+//! Where constants of the arm are parameters q, `eta = xi_x + C xi_y + E q` with `E` of each candidate. Then `S` is the
+//! covariance for known q, and beside it `U U'` with `U = [K_x + C K_y + E L; K_c]`, `L L'` the covariance of q and
+//! `K L'` its covariance with the others: again what cancels does so before it is squared.
 
 use nalgebra::{DMatrix, Matrix6};
 
@@ -34,6 +38,25 @@ pub(super) struct Form {
     pub constant: Vec<f64>,
     /// The part that the motion moves; none if it moves nothing.
     pub moved: Option<Box<Moved>>,
+    /// The part of the arm; none where its errors are no part of the model.
+    pub arm: Option<OfArm>,
+}
+
+/// `U = [of_x + C of_y + E root; pixel]` of the arm's constants, one entry per column; what no candidate changes in
+/// `U U'` is among the constants. The noise of the joints comes beside it, as it is.
+#[derive(Clone, Default)]
+pub(super) struct OfArm {
+    pub columns: Vec<ArmColumn>,
+    /// Lower triangle, row by row.
+    pub root: Vec<Vec<f64>>,
+}
+
+/// What goes with a column of the root.
+#[derive(Clone)]
+pub(super) struct ArmColumn {
+    pub of_x: [f64; 6],
+    pub of_y: [f64; 6],
+    pub pixel: Vec<f64>,
 }
 
 /// `U = [offset + C root; pixel]`. What no motion moves in `U U'` is among the constants: `pixel pixel'`, and the square
@@ -52,6 +75,8 @@ pub(super) struct Observed {
     /// `[eta; c]` columns.
     pub constant: Vec<Vec<f64>>,
     pub of_y: Vec<[f64; 6]>,
+    /// Beside it `[of_arm E', 0]`.
+    pub of_arm: Vec<Vec<f64>>,
 }
 
 /// `1/2 ln (|I + N with| / |I + N without|)`.
@@ -92,27 +117,85 @@ impl Entropies {
         pixel_parameters: usize,
         x: &Se3,
         robot: &RobotError,
+        arm: Arm,
     ) -> Result<Self, Error> {
         let size = 6 + pixel_parameters;
         let noise = RobotNoise::new(x, robot);
-        let without = match (of, robot.is_none()) {
+        let without = match (of, robot.is_none() && !arm.noisy) {
             (EntropyOf::Everything, true) => None,
             // The robot's error moves the twist alone.
-            (EntropyOf::Everything, false) => Some(noise.form(6)),
+            (EntropyOf::Everything, false) => Some(robot_only(0, x, robot, arm)),
             (EntropyOf::HandEye, _) => {
-                let (nuisance, _) = belief
-                    .nuisance()
-                    .ok_or_else(|| Error::degenerate("the information of the target's pose is singular"))?;
-                let mut of_rest = nuisance.view((0, 0), (size, size)).into_owned();
+                let n = belief.len() - 6;
+                let nuisance = belief.information().view((6, 6), (n, n)).into_owned();
+                let (mut of_rest, of_arm) = apart(&nuisance, size, 0, arm)?;
                 if let Some(root) = &noise.right {
                     let mut of_y = of_rest.view_mut((0, 0), (6, 6));
                     of_y += square(root);
                 }
-                Some(without_chain(&of_rest, &noise.left))
+                Some(with_arm(without_chain(&of_rest, &noise.left), of_arm))
             }
         };
-        Ok(Self { with: predicted(belief, pixel_parameters, x, robot)?, without })
+        Ok(Self { with: predicted(belief, pixel_parameters, x, robot, arm)?, without })
     }
+}
+
+/// What of the arm's errors is part of a call.
+#[derive(Clone, Copy)]
+pub(super) struct Arm {
+    /// Whether candidates come with what its constants move.
+    pub known: bool,
+    /// Whether they come with noise of the joints.
+    pub noisy: bool,
+}
+
+fn singular() -> Error {
+    Error::degenerate("the information of the target's pose is singular")
+}
+
+/// Of the information of `[(xi_x), xi_y, c, q]`, `xi_x` of `chain` rows: the covariance of the first `told` parameters,
+/// q known where the arm is, and what q adds to it.
+fn apart(
+    information: &DMatrix<f64>,
+    told: usize,
+    chain: usize,
+    arm: Arm,
+) -> Result<(DMatrix<f64>, Option<OfArm>), Error> {
+    let (whole, _) = invert(information).ok_or_else(singular)?;
+    if !arm.known {
+        let of_noise = arm.noisy.then(OfArm::default);
+        return Ok((whole.view((0, 0), (told, told)).into_owned(), of_noise));
+    }
+    let (given, _) = invert(&information.view((0, 0), (told, told)).into_owned()).ok_or_else(singular)?;
+    let count = information.nrows() - told;
+    let root =
+        whole.view((told, told), (count, count)).into_owned().cholesky().ok_or_else(singular)?.unpack();
+    // K' = L^-1 of the covariance of q with the others.
+    let mut with = whole.view((told, 0), (count, told)).into_owned();
+    root.solve_lower_triangular_mut(&mut with);
+    let columns = (0..count)
+        .map(|j| ArmColumn {
+            of_x: std::array::from_fn(|i| if chain == 0 { 0.0 } else { with[(j, i)] }),
+            of_y: std::array::from_fn(|i| with[(j, chain + i)]),
+            pixel: (chain + 6..told).map(|i| with[(j, i)]).collect(),
+        })
+        .collect();
+    let root = (0..count).map(|i| (0..=i).map(|j| root[(i, j)]).collect()).collect();
+    Ok((given, Some(OfArm { columns, root })))
+}
+
+/// A form with the arm beside it.
+fn with_arm(mut form: Form, arm: Option<OfArm>) -> Form {
+    if let Some(arm) = &arm {
+        for i in 6..form.size {
+            for j in i..form.size {
+                form.constant[packed(form.size, i, j)] +=
+                    arm.columns.iter().map(|c| c.pixel[i - 6] * c.pixel[j - 6]).sum::<f64>();
+            }
+        }
+    }
+    form.arm = arm;
+    form
 }
 
 /// `S + S_r`: the covariance of what a view measures.
@@ -121,10 +204,10 @@ pub(super) fn predicted(
     pixel_parameters: usize,
     x: &Se3,
     robot: &RobotError,
+    arm: Arm,
 ) -> Result<Form, Error> {
-    let singular = || Error::degenerate("the covariance of the target's pose is singular");
     let noise = RobotNoise::new(x, robot);
-    let covariance = belief.covariance();
+    let (covariance, of_arm) = apart(belief.information(), CHAIN + pixel_parameters, 6, arm)?;
     let chain = covariance.view((0, 0), (CHAIN, CHAIN)).into_owned();
     let (information, _) = invert(&chain).ok_or_else(singular)?;
     let (conditional, _) = invert(&information.view((0, 0), (6, 6)).into_owned()).ok_or_else(singular)?;
@@ -152,7 +235,7 @@ pub(super) fn predicted(
     constant
         .view_mut((6, 6), (pixel_parameters, pixel_parameters))
         .copy_from(&covariance.view((CHAIN, CHAIN), (pixel_parameters, pixel_parameters)));
-    Ok(form(&constant, Some((&offset, &root, &pixel))))
+    Ok(with_arm(form(&constant, Some((&offset, &root, &pixel))), of_arm))
 }
 
 /// The same with `xi_x` known: `of_rest` is the covariance of `[xi_y; c]`, `left` that of the robot's error.
@@ -199,6 +282,7 @@ fn form(constant: &DMatrix<f64>, moved: Option<(&Matrix6<f64>, &Matrix6<f64>, &D
                 pixel: (0..size - 6).map(|i| std::array::from_fn(|j| pixel[(i, j)])).collect(),
             })
         }),
+        arm: None,
     }
 }
 
@@ -238,13 +322,19 @@ fn square(root: &Matrix6<f64>) -> Matrix6<f64> {
 
 impl Observed {
     /// The covariance of the first parameters of the chain with `[eta; c]`, each row times its weight.
-    pub fn covariance(belief: &Belief, pixel_parameters: usize, weights: &[f64]) -> Self {
+    pub fn covariance(belief: &Belief, pixel_parameters: usize, weights: &[f64], arm: Arm) -> Self {
         let covariance = belief.covariance();
         let entry = |i: usize, j: usize| covariance[(i, j)] * weights[i];
         let columns = || (0..6).chain(CHAIN..CHAIN + pixel_parameters);
         Self {
             constant: (0..weights.len()).map(|i| columns().map(|j| entry(i, j)).collect()).collect(),
             of_y: (0..weights.len()).map(|i| std::array::from_fn(|j| entry(i, 6 + j))).collect(),
+            of_arm: (0..weights.len())
+                .map(|i| {
+                    let first = if arm.known { CHAIN + pixel_parameters } else { belief.len() };
+                    (first..belief.len()).map(|j| entry(i, j)).collect()
+                })
+                .collect(),
         }
     }
 
@@ -256,11 +346,14 @@ impl Observed {
                 .map(|i| (0..6 + pixel_parameters).map(|j| if j < 6 { unit(i, j) } else { 0.0 }).collect())
                 .collect(),
             of_y: (0..CHAIN).map(|i| std::array::from_fn(|j| unit(i, 6 + j))).collect(),
+            of_arm: vec![vec![]; CHAIN],
         }
     }
 }
 
 /// What the robot's error alone makes of a view.
-pub(super) fn robot_only(pixel_parameters: usize, x: &Se3, robot: &RobotError) -> Form {
-    RobotNoise::new(x, robot).form(6 + pixel_parameters)
+pub(super) fn robot_only(pixel_parameters: usize, x: &Se3, robot: &RobotError, arm: Arm) -> Form {
+    let mut form = RobotNoise::new(x, robot).form(6 + pixel_parameters);
+    form.arm = arm.noisy.then(OfArm::default);
+    form
 }

@@ -26,18 +26,19 @@ use self::algebra::{Determinant, Gains};
 use self::approach::{Approach, MATRIX};
 use self::block::{BLOCK, Block, Row};
 use self::distorted::Distorted;
-use self::forms::{Entropies, Form, Observed, packed, predicted, robot_only};
+use self::forms::{Arm, Entropies, Form, Observed, packed, predicted, robot_only};
 use self::pinhole::Pinhole;
 use self::target::Target;
 use self::wide_algebra::{Outcome, Wide};
 use self::wide_points::{Column, WidePoints};
 use self::window::Window;
 use super::belief::Belief;
-use super::candidate::{CandidateModel, Execution, Motions, RobotError, Sums};
+use super::candidate::{ArmColumns, CandidateModel, Execution, Motions, Sums};
 use super::criteria::{Gain, Quantity};
 use crate::batched_algebra::{UPPER, upper};
 use crate::camera::{Camera, Lens};
 use crate::error::Error;
+use crate::interrupt;
 use crate::least_squares::PixelParameters;
 use crate::se3::Se3;
 use crate::se3::entries;
@@ -48,8 +49,9 @@ pub(super) struct Scorer<'a> {
     model: &'a CandidateModel<'a>,
     x: [f64; 12],
     y: [f64; 12],
-    /// What gains are averaged over, with weights.
-    goals: Vec<(f64, Goal<'a>)>,
+    goal: Goal<'a>,
+    /// Columns of the arm's constants and of its noise.
+    arm_counts: (usize, usize),
     /// Present where lanes can do the points.
     lanes: Option<(Window, Target)>,
     columns: Vec<Column>,
@@ -58,60 +60,69 @@ pub(super) struct Scorer<'a> {
 
 /// What makes a gain.
 enum Goal<'a> {
+    /// None is wanted, only what is in sight.
+    Sight,
     Entropy(Entropies),
     Trace(Form, Observed),
     HandEye(Form, Observed, Box<dyn Gain + 'a>),
 }
 
 impl<'a> Scorer<'a> {
-    /// Without a goal yet.
-    pub fn new(model: &'a CandidateModel<'a>, unit: VectorUnit) -> Self {
-        let target =
-            if model.camera.lens == Lens::KannalaBrandt { None } else { Target::new(model.features) };
+    /// For the gains that a criterion makes of a quantity over a belief.
+    pub fn new(
+        model: &'a CandidateModel<'a>,
+        unit: VectorUnit,
+        (belief, quantity, gain): (&'a Belief, &Quantity, Box<dyn Gain + 'a>),
+        arm: Option<&ArmColumns<'_>>,
+    ) -> Result<Self, Error> {
+        let mut scorer = Self::without_goal(model, unit);
+        let (count, x, robot) = (scorer.columns.len(), &model.x, &model.robot);
+        scorer.arm_counts = arm.map_or((0, 0), |arm| arm.counts);
+        let (constants, noise) = scorer.arm_counts;
+        let arm = Arm { known: constants > 0, noisy: noise > 0 };
+        scorer.goal = match quantity {
+            Quantity::Entropy(of) => Goal::Entropy(Entropies::new(belief, *of, count, x, robot, arm)?),
+            Quantity::CovarianceTrace(weights) => Goal::Trace(
+                predicted(belief, count, x, robot, arm)?,
+                Observed::covariance(belief, count, weights, arm),
+            ),
+            Quantity::InformationTrace(weights) => {
+                Goal::Trace(robot_only(count, x, robot, arm), Observed::information(count, weights))
+            }
+            Quantity::HandEyeCovariance => Goal::HandEye(
+                predicted(belief, count, x, robot, arm)?,
+                Observed::covariance(belief, count, &[1.0; 6], arm),
+                gain,
+            ),
+        };
+        Ok(scorer)
+    }
+
+    fn without_goal(model: &'a CandidateModel<'a>, unit: VectorUnit) -> Self {
+        let target = if model.camera.lens.in_lanes() { Target::new(model.features) } else { None };
         Self {
             model,
             x: entries(&model.x),
             y: entries(&model.y),
-            goals: Vec::new(),
+            goal: Goal::Sight,
+            arm_counts: (0, 0),
             lanes: target.map(|target| (window(model), target)),
             columns: model.pixel_parameters.map_or_else(Vec::new, columns),
             unit,
         }
     }
 
-    /// Adds what a belief makes of candidates, given the robot's error, with a weight.
-    pub fn add_goal(
-        &mut self,
-        weight: f64,
-        belief: &'a Belief,
-        robot: &RobotError,
-        quantity: &Quantity,
-        gain: Box<dyn Gain + 'a>,
-    ) -> Result<(), Error> {
-        let (count, x) = (self.columns.len(), &self.model.x);
-        let goal = match quantity {
-            Quantity::Entropy(of) => Goal::Entropy(Entropies::new(belief, *of, count, x, robot)?),
-            Quantity::CovarianceTrace(weights) => {
-                Goal::Trace(predicted(belief, count, x, robot)?, Observed::covariance(belief, count, weights))
-            }
-            Quantity::InformationTrace(weights) => {
-                Goal::Trace(robot_only(count, x, robot), Observed::information(count, weights))
-            }
-            Quantity::HandEyeCovariance => Goal::HandEye(
-                predicted(belief, count, x, robot)?,
-                Observed::covariance(belief, count, &[1.0; 6]),
-                gain,
-            ),
-        };
-        self.goals.push((weight, goal));
-        Ok(())
-    }
-
     /// Gains of motions; NaN where too little would be in sight.
-    pub fn score(&self, motions: Motions<'_>, execution: &Execution, gains: &mut [f64]) -> Result<(), Error> {
+    pub fn score(
+        &self,
+        motions: Motions<'_>,
+        arm: Option<ArmColumns<'_>>,
+        execution: &Execution,
+        gains: &mut [f64],
+    ) -> Result<(), Error> {
         let threads = execution.threads_for(gains.len());
         if threads == 1 {
-            return self.score_in_turn(motions, gains);
+            return self.score_in_turn(motions, arm, gains);
         }
         let share = gains.len().div_ceil(threads).next_multiple_of(BLOCK);
         std::thread::scope(|scope| {
@@ -120,7 +131,8 @@ impl<'a> Scorer<'a> {
                 .enumerate()
                 .map(|(i, gains)| {
                     let motions = motions.part(i * share, gains.len());
-                    scope.spawn(move || self.score_in_turn(motions, gains))
+                    let arm = arm.map(|arm| arm.part(i * share, gains.len()));
+                    scope.spawn(move || self.score_in_turn(motions, arm, gains))
                 })
                 .collect();
             workers.into_iter().try_for_each(|worker| match worker.join() {
@@ -130,12 +142,18 @@ impl<'a> Scorer<'a> {
         })
     }
 
-    fn score_in_turn(&self, motions: Motions<'_>, gains: &mut [f64]) -> Result<(), Error> {
-        let mut block = Box::new(Block::new(self.size()));
+    fn score_in_turn(
+        &self,
+        motions: Motions<'_>,
+        arm: Option<ArmColumns<'_>>,
+        gains: &mut [f64],
+    ) -> Result<(), Error> {
+        let mut block = Box::new(Block::new(self.size(), self.arm_counts));
         let mut sums = self.model.sums();
         let mut padded = [0.0; BLOCK * MATRIX];
         let mut out = [0.0; BLOCK];
         for (i, gains) in gains.chunks_mut(BLOCK).enumerate() {
+            interrupt::check();
             let part = motions.part(i * BLOCK, gains.len());
             let matrices = match part {
                 Motions::Matrices(matrices) if gains.len() == BLOCK => matrices,
@@ -146,15 +164,45 @@ impl<'a> Scorer<'a> {
             };
             self.approach(matrices, &mut block)?;
             self.inform(&mut block, &mut sums);
-            gains.fill(0.0);
-            for (weight, goal) in &self.goals {
-                self.weigh(goal, &mut block, &mut out);
-                for (gain, one) in gains.iter_mut().zip(&out) {
-                    *gain += weight * one;
+            if let Some(arm) = &arm {
+                self.attach(&arm.part(i * BLOCK, gains.len()), &mut block);
+            }
+            self.weigh(&mut block, &mut out);
+            gains.copy_from_slice(&out[..gains.len()]);
+        }
+        Ok(())
+    }
+
+    /// Puts what the arm's errors move into the camera frame.
+    fn attach(&self, arm: &ArmColumns<'_>, block: &mut Block) {
+        let to_camera = self.model.x.adjoint();
+        let fewest = self.model.visibility.fewest.max(1) as f64;
+        let (constants, noise) = arm.counts;
+        let mut moved = vec![0.0; constants.max(noise)];
+        for (first, entries, count) in [(0, arm.constants, constants), (constants, arm.noise, noise)] {
+            if count == 0 {
+                continue;
+            }
+            for (lane, entries) in entries.chunks_exact(6 * count).enumerate() {
+                if block.seen[lane] < fewest {
+                    continue;
+                }
+                for i in 0..6 {
+                    let moved = &mut moved[..count];
+                    moved.fill(0.0);
+                    for (k, row) in entries.chunks_exact(count).enumerate() {
+                        let factor = to_camera[(i, k)];
+                        for (to, from) in moved.iter_mut().zip(row) {
+                            *to += factor * from;
+                        }
+                    }
+                    let rows = block.arm[6 * first..].iter_mut().skip(i).step_by(6);
+                    for (row, moved) in rows.zip(moved.iter()) {
+                        row[lane] = *moved;
+                    }
                 }
             }
         }
-        Ok(())
     }
 
     /// Rows of a candidate's information.
@@ -196,19 +244,20 @@ impl<'a> Scorer<'a> {
                 dispatch(self.unit, WidePoints::<$($flag),*> { parameters, columns, window, target, block })
             }};
         }
-        let distorts = !matches!(self.model.camera.lens, Lens::Pinhole | Lens::KannalaBrandt);
+        let distorts = self.model.camera.lens != Lens::Pinhole;
         if !distorts && self.inform_of_plane(window, target, block) {
             return;
         }
         match (self.model.camera.lens, self.columns.is_empty()) {
-            (Lens::Pinhole | Lens::KannalaBrandt, false) => see_wide!(false, false, false),
-            (Lens::Pinhole | Lens::KannalaBrandt | Lens::BrownConrady4 | Lens::BrownConrady5, true) => {
+            (Lens::Pinhole, false) => see_wide!(false, false, false),
+            (Lens::Pinhole | Lens::BrownConrady4 | Lens::BrownConrady5, true) => {
                 see!(Distorted, false, false);
             }
             (Lens::BrownConrady4 | Lens::BrownConrady5, false) => see_wide!(true, false, false),
             (Lens::BrownConrady8, true) => see!(Distorted, true, false),
             (Lens::BrownConrady12, true) => see!(Distorted, true, true),
             (Lens::BrownConrady8 | Lens::BrownConrady12, false) => see_wide!(true, true, true),
+            _ => unreachable!("other lenses go feature by feature"),
         }
     }
 
@@ -246,14 +295,19 @@ impl<'a> Scorer<'a> {
     }
 
     /// Information to gains.
-    fn weigh(&self, goal: &Goal<'_>, block: &mut Block, out: &mut Row) {
+    fn weigh(&self, block: &mut Block, out: &mut Row) {
         let mut scale = 1.0;
         if self.lanes.is_some() {
             // Lanes leave out what is common to all points.
             scale = (self.model.camera.parameters[0] / self.model.pixel_sigma).powi(2);
         }
         let fewest = self.model.visibility.fewest.max(1) as f64;
-        match goal {
+        match &self.goal {
+            Goal::Sight => {
+                for (out, seen) in out.iter_mut().zip(&block.seen) {
+                    *out = if *seen >= fewest { 1.0 } else { f64::NAN };
+                }
+            }
             Goal::Entropy(Entropies { with, without }) => {
                 let mut determinants = [1.0; BLOCK];
                 self.determinant(scale, with, block, &mut determinants);
@@ -283,7 +337,7 @@ impl<'a> Scorer<'a> {
     }
 
     fn determinant(&self, scale: f64, form: &Form, block: &Block, out: &mut Row) {
-        if form.size == 6 {
+        if form.size == 6 && form.arm.is_none() {
             dispatch(self.unit, Determinant { scale, size: self.size(), form, block, out });
         } else {
             self.take(scale, form, block, Outcome::Determinant(out));
@@ -291,12 +345,26 @@ impl<'a> Scorer<'a> {
     }
 
     fn take(&self, scale: f64, form: &Form, block: &Block, outcome: Outcome<'_>) {
+        let rows = self.size();
         if form.size <= 12 {
-            dispatch(self.unit, Wide::<12, 78> { scale, form, block, outcome });
+            dispatch(self.unit, Wide::<12, 78> { scale, form, rows, block, outcome });
         } else {
-            dispatch(self.unit, Wide::<23, 276> { scale, form, block, outcome });
+            dispatch(self.unit, Wide::<23, 276> { scale, form, rows, block, outcome });
         }
     }
+}
+
+/// Which motions would show enough of the target.
+pub(super) fn in_sight(
+    model: &CandidateModel<'_>,
+    motions: Motions<'_>,
+    execution: &Execution,
+) -> Result<Vec<bool>, Error> {
+    // What a view tells of camera and board has no say in what it shows.
+    let model = CandidateModel { pixel_parameters: None, ..model.clone() };
+    let mut seen = vec![0.0; motions.len()];
+    Scorer::without_goal(&model, execution.unit).score(motions, None, execution, &mut seen)?;
+    Ok(seen.iter().map(|seen| !seen.is_nan()).collect())
 }
 
 /// The pixel parameters in the order of their columns.

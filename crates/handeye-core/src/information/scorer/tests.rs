@@ -7,7 +7,7 @@ use crate::camera::{Camera, Feature, Lens};
 use crate::information::criteria::{
     Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, ToolPoint, Trace,
 };
-use crate::information::{Belief, CandidateModel, Execution, Motions, RobotError, Supposition, Visibility};
+use crate::information::{ArmColumns, Belief, CandidateModel, Execution, Motions, RobotError, Visibility};
 use crate::least_squares::PixelParameters;
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
@@ -21,6 +21,7 @@ fn camera(lens: Lens) -> Camera {
     let fisheye = [500.0, 490.0, 630.0, 520.0, 0.01, -0.02, 0.003, -0.001];
     match lens {
         Lens::KannalaBrandt => Camera::new(lens, &fisheye).unwrap(),
+        Lens::Division => Camera::new(lens, &all[..5]).unwrap(),
         _ => Camera::new(lens, &all[..lens.parameter_count()]).unwrap(),
     }
 }
@@ -155,6 +156,7 @@ impl Scene {
                         &self.belief,
                         criterion,
                         Motions::Transforms(&self.motions),
+                        None,
                         &Execution { unit, threads },
                     )
                     .unwrap();
@@ -312,39 +314,55 @@ fn boards_are_seen_from_the_side_too() {
 }
 
 #[test]
-fn a_mean_over_suppositions_is_the_mean_of_each() {
-    for lens in [Lens::Pinhole, Lens::BrownConrady5, Lens::KannalaBrandt] {
+fn errors_of_the_arm_are_taken_in_lanes_too() {
+    for (lens, noise) in
+        [(Lens::Pinhole, 6), (Lens::BrownConrady5, 0), (Lens::BrownConrady5, 5), (Lens::KannalaBrandt, 6)]
+    {
         let random = &mut Random::new(30);
         let mut scene = Scene::new(random, lens, 70, false, 0.0);
-        let camera = vec![0, 2, 4];
-        if lens != Lens::Pinhole {
-            scene.pixel_parameters = Some(PixelParameters { camera, board_scale: false });
-            scene.belief = scene.start();
+        scene.kinematic_count = 9;
+        if lens == Lens::BrownConrady5 {
+            scene.pixel_parameters = Some(PixelParameters { camera: vec![0, 2, 4], board_scale: true });
         }
-        let wider = Belief::new(scene.belief.information() * 0.5).unwrap();
-        let supposed = [
-            Supposition { weight: 0.5, belief: &scene.belief, robot: RobotError::default() },
-            Supposition { weight: 0.2, belief: &wider, robot: RobotError::on_left(robot_root(random)) },
-            Supposition { weight: 0.3, belief: &wider, robot: RobotError::on_right(robot_root(random)) },
-        ];
-        let execution = Execution::default();
-        let motions = Motions::Transforms(&scene.motions);
+        scene.belief = scene.start();
+        scene.robot =
+            if noise == 5 { RobotError::default() } else { RobotError::on_right(robot_root(random)) };
+        let count = scene.motions.len();
+        let constants: Vec<f64> = (0..count * 6 * 9).map(|_| random.uniform(-1.0, 1.0)).collect();
+        let roots: Vec<f64> = (0..count * 6 * noise).map(|_| random.uniform(-5e-4, 5e-4)).collect();
+        let arm = ArmColumns { constants: &constants, noise: &roots, counts: (9, noise) };
+        let model = scene.model();
         for criterion in criteria() {
             let criterion = criterion.as_ref();
-            let mean = scene.model().mean_gains(&supposed, criterion, motions, &execution).unwrap();
-            let mut expected = vec![0.0; mean.len()];
-            for one in &supposed {
-                let model = CandidateModel { robot: one.robot, ..scene.model() };
-                let gains = model.gains_by(one.belief, criterion, motions, &execution).unwrap();
-                for (sum, gain) in expected.iter_mut().zip(gains) {
-                    *sum += one.weight * gain;
+            let prepared = criterion.prepare(&scene.belief).unwrap();
+            let expected = scene.motions.iter().enumerate().map(|(i, motion)| {
+                model.candidate(motion, Some(&arm.of(i))).map_or(f64::NAN, |c| prepared.gain(&c.factor))
+            });
+            let expected: Vec<f64> = expected.collect();
+            assert!(expected.iter().filter(|gain| gain.is_finite()).count() > 20);
+            for threads in [1, 3] {
+                let execution = Execution { unit: VectorUnit::widest(), threads };
+                let motions = Motions::Transforms(&scene.motions);
+                let found = model.gains_by(&scene.belief, criterion, motions, Some(arm), &execution).unwrap();
+                for (found, expected) in found.iter().zip(&expected) {
+                    let close = (found - expected).abs() <= 1e-7 * expected.abs().max(0.1);
+                    let name = criterion.name();
+                    assert!(close || (found.is_nan() && expected.is_nan()), "{name}: {found} for {expected}");
                 }
             }
-            for (mean, expected) in mean.iter().zip(&expected) {
-                let close = (mean - expected).abs() <= 1e-12 * expected.abs();
-                assert!(close || (mean.is_nan() && expected.is_nan()), "{mean} for {expected}");
-            }
         }
+    }
+}
+
+#[test]
+fn what_is_in_sight_is_what_has_a_gain() {
+    for lens in [Lens::Pinhole, Lens::BrownConrady5, Lens::KannalaBrandt] {
+        let scene = Scene::new(&mut Random::new(5), lens, 150, false, 0.0);
+        let model = scene.model();
+        let gains = model.gains(&scene.belief, &Entropy, &scene.motions).unwrap();
+        let seen = model.in_sight(Motions::Transforms(&scene.motions), &Execution::default()).unwrap();
+        assert_eq!(seen, gains.iter().map(|gain| !gain.is_nan()).collect::<Vec<_>>());
+        assert!(seen.contains(&true) && seen.contains(&false));
     }
 }
 
@@ -409,7 +427,7 @@ fn matrices_are_repaired_or_refused() {
     for unit in VectorUnit::ALL {
         let execution = Execution { unit, threads: 1 };
         let run = |matrices: &[f64]| {
-            model.gains_by(&scene.belief, &Entropy, Motions::Matrices(matrices), &execution)
+            model.gains_by(&scene.belief, &Entropy, Motions::Matrices(matrices), None, &execution)
         };
         for (found, expected) in run(&matrices).unwrap().iter().zip(&expected) {
             let close = (found - expected).abs() < 1e-10 * expected.abs();

@@ -6,7 +6,7 @@
 
 use super::algebra::{NULL_PIVOT, add_square, spread};
 use super::block::{BLOCK, Block, Row};
-use super::forms::{Form, Moved, Observed, packed};
+use super::forms::{Form, Moved, Observed, OfArm, packed};
 use crate::batched_algebra::{UPPER, load, upper};
 use crate::simd::{Kernel, Simd, Vector};
 
@@ -24,6 +24,8 @@ pub(super) enum Outcome<'a> {
 pub(super) struct Wide<'a, const CAPACITY: usize, const PACKED: usize> {
     pub scale: f64,
     pub form: &'a Form,
+    /// Rows of the information in the block, of which the form's come first.
+    pub rows: usize,
     pub block: &'a Block,
     pub outcome: Outcome<'a>,
 }
@@ -49,8 +51,13 @@ impl<const CAPACITY: usize, const PACKED: usize> Kernel for Wide<'_, CAPACITY, P
         };
         let mut observed_rows = [[zero; CAPACITY]; ROWS];
         for at in (0..BLOCK).step_by(S::LANES) {
-            for (to, from) in work.information.iter_mut().zip(self.block.information.iter()) {
-                *to = simd.load(&from[at..]) * scale;
+            let mut place = 0;
+            for i in 0..size {
+                let line = &self.block.information[packed(self.rows, i, i)..][..size - i];
+                for from in line {
+                    work.information[place] = simd.load(&from[at..]) * scale;
+                    place += 1;
+                }
             }
             for (to, from) in work.covariance.iter_mut().zip(&self.form.constant) {
                 *to = simd.splat(*from);
@@ -58,6 +65,9 @@ impl<const CAPACITY: usize, const PACKED: usize> Kernel for Wide<'_, CAPACITY, P
             let before_y = load(simd, &self.block.before_y, at);
             if let Some(moved) = &self.form.moved {
                 add_moved(simd, moved, &before_y, size, &mut work.covariance);
+            }
+            if let Some(arm) = &self.form.arm {
+                add_arm(simd, arm, self.block, (at, &before_y), size, &mut work.covariance);
             }
             for k in 0..size {
                 work.floors[k] = simd.splat(NULL_PIVOT) * work.covariance[packed(size, k, k)];
@@ -75,7 +85,7 @@ impl<const CAPACITY: usize, const PACKED: usize> Kernel for Wide<'_, CAPACITY, P
                         work.take(simd, k, 0);
                     }
                     let rows = &mut observed_rows[..observed.constant.len()];
-                    observe(simd, observed, &before_y, rows);
+                    observe(simd, observed, self.block, (at, &before_y), rows);
                     let mut trace = zero;
                     for row in rows {
                         work.weigh(simd, row);
@@ -90,7 +100,7 @@ impl<const CAPACITY: usize, const PACKED: usize> Kernel for Wide<'_, CAPACITY, P
                         work.take(simd, k, 0);
                     }
                     let rows = &mut observed_rows[..6];
-                    observe(simd, observed, &before_y, rows);
+                    observe(simd, observed, self.block, (at, &before_y), rows);
                     for i in 0..6 {
                         work.weigh(simd, &rows[i]);
                         for j in i..6 {
@@ -135,29 +145,99 @@ fn add_moved<S: Simd>(
     }
 }
 
-/// `Z = constant + [of_y C', 0]`; a row `[a, b]` of `of_y` times `C'` is `[R a + t x R b, R b]`.
+/// Adds `U U'` of the arm's constants, and the covariance of its noise.
+#[inline(always)]
+fn add_arm<S: Simd>(
+    simd: S,
+    arm: &OfArm,
+    block: &Block,
+    (at, before_y): (usize, &[S::Vector; 12]),
+    size: usize,
+    covariance: &mut [S::Vector],
+) {
+    let zero = simd.splat(0.0);
+    let mut square = [zero; UPPER];
+    let mut u = [zero; 6];
+    for (j, column) in arm.columns.iter().enumerate() {
+        for (u, x) in u.iter_mut().zip(&column.of_x) {
+            *u = simd.splat(*x);
+        }
+        add_turned(simd, &column.of_y, before_y, &mut u);
+        for (row, moved) in arm.root.iter().zip(block.arm.chunks_exact(6)).skip(j) {
+            let factor = simd.splat(row[j]);
+            for (u, moved) in u.iter_mut().zip(moved) {
+                *u = simd.load(&moved[at..]).mul_add(factor, *u);
+            }
+        }
+        add_outer(&u, &mut square);
+        for (i, u) in u.iter().enumerate() {
+            let first = packed(size, i, 5) + 1;
+            for (entry, pixel) in covariance[first..].iter_mut().zip(&column.pixel) {
+                *entry = u.mul_add(simd.splat(*pixel), *entry);
+            }
+        }
+    }
+    let (constants, _) = block.arm_counts;
+    for moved in block.arm.chunks_exact(6).skip(constants) {
+        for (u, moved) in u.iter_mut().zip(moved) {
+            *u = simd.load(&moved[at..]);
+        }
+        add_outer(&u, &mut square);
+    }
+    for i in 0..6 {
+        for j in i..6 {
+            let entry = &mut covariance[packed(size, i, j)];
+            *entry = *entry + square[upper(i, j)];
+        }
+    }
+}
+
+/// Adds `u u'`.
+#[inline(always)]
+fn add_outer<V: Vector>(u: &[V; 6], square: &mut [V; UPPER]) {
+    for i in 0..6 {
+        for j in i..6 {
+            square[upper(i, j)] = u[i].mul_add(u[j], square[upper(i, j)]);
+        }
+    }
+}
+
+/// Adds `C [a, b]`, `C = Ad(T)`: `[R a + t x R b, R b]`.
+#[inline(always)]
+fn add_turned<S: Simd>(simd: S, of_y: &[f64; 6], t: &[S::Vector; 12], to: &mut [S::Vector]) {
+    let mut low = [simd.splat(0.0); 3];
+    for i in 0..3 {
+        for k in 0..3 {
+            to[i] = t[3 * i + k].mul_add(simd.splat(of_y[k]), to[i]);
+            low[i] = t[3 * i + k].mul_add(simd.splat(of_y[3 + k]), low[i]);
+        }
+    }
+    for i in 0..3 {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        to[i] = t[9 + b].neg_mul_add(low[a], t[9 + a].mul_add(low[b], to[i]));
+        to[3 + i] = to[3 + i] + low[i];
+    }
+}
+
+/// `Z = constant + [of_y C' + of_arm E', 0]`.
 #[inline(always)]
 fn observe<S: Simd, const CAPACITY: usize>(
     simd: S,
     observed: &Observed,
-    t: &[S::Vector; 12],
+    block: &Block,
+    (at, t): (usize, &[S::Vector; 12]),
     rows: &mut [[S::Vector; CAPACITY]],
 ) {
-    for ((to, constant), of_y) in rows.iter_mut().zip(&observed.constant).zip(&observed.of_y) {
+    let parts = observed.constant.iter().zip(&observed.of_y).zip(&observed.of_arm);
+    for (to, ((constant, of_y), of_arm)) in rows.iter_mut().zip(parts) {
         for (to, constant) in to.iter_mut().zip(constant) {
             *to = simd.splat(*constant);
         }
-        let mut low = [simd.splat(0.0); 3];
-        for i in 0..3 {
-            for k in 0..3 {
-                to[i] = t[3 * i + k].mul_add(simd.splat(of_y[k]), to[i]);
-                low[i] = t[3 * i + k].mul_add(simd.splat(of_y[3 + k]), low[i]);
+        add_turned(simd, of_y, t, to);
+        for (value, moved) in of_arm.iter().zip(block.arm.chunks_exact(6)) {
+            for (to, row) in to.iter_mut().zip(moved) {
+                *to = simd.load(&row[at..]).mul_add(simd.splat(*value), *to);
             }
-        }
-        for i in 0..3 {
-            let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-            to[i] = t[9 + b].neg_mul_add(low[a], t[9 + a].mul_add(low[b], to[i]));
-            to[3 + i] = to[3 + i] + low[i];
         }
     }
 }

@@ -109,7 +109,7 @@ impl<'a> BatchedEngine<'a> {
             Lens::Pinhole => linearise!(false, false),
             Lens::BrownConrady4 | Lens::BrownConrady5 => linearise!(true, false),
             Lens::BrownConrady8 | Lens::BrownConrady12 => linearise!(true, true),
-            Lens::KannalaBrandt => unreachable!("a fisheye's measurements are not packed"),
+            _ => unreachable!("measurements through other lenses are not packed"),
         }
         let parts = self.measurements.parts;
         let mut cost = 0.0;

@@ -1,0 +1,178 @@
+"""`handeye study public`: cells and data that others made, against what others use."""
+
+import importlib.metadata
+from collections.abc import Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from handeye.cli.answer import Answer
+from handeye.cli.options import Common
+from handeye.cli.output import check_folder
+from handeye.cli.progress import progress
+from handeye.cli.study import Data, Trials, write_results
+from handeye.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+PACKAGES = ("handeye", "numpy", "opencv-contrib-python-headless")
+
+
+class PublicPart(StrEnum):
+    """What the comparison has."""
+
+    SETS = "sets"
+    KINHEC = "kinhec"
+    CELL = "cell"
+    FOLDER = "folder"
+
+
+def public(
+    *,
+    parts: Annotated[tuple[PublicPart, ...], Parameter(consume_multiple=True)] = (PublicPart.SETS,),
+    kinhec: Path | None = None,
+    tracks: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("pnp", "robot_error"),
+    most: int | None = None,
+    folder: Path | None = None,
+    data: Data = Data(),  # noqa: B008
+    trials: Trials = Trials(),  # noqa: B008
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Compare on cells and data that others made.
+
+    sets: the paper's table I taken apart, on the sets of Ali et al. kinhec: tracks of poses through KinHEC's
+    own benchmark, beside its solvers. cell: MoveIt Pro's cell rebuilt and rendered by MuJoCo, exact arm
+    and realistic one. folder: every method on a folder of your own, by how well halves of its views agree.
+
+    Parameters
+    ----------
+    parts
+        Which of sets, kinhec, cell and folder.
+    kinhec
+        Folder that `kinhec generate` wrote, or the published set; needs the extra `public`.
+    tracks
+        Tracks of KinHEC.
+    most
+        Most sequences of each track; all by default.
+    folder
+        Any folder with views that `handeye solve` reads.
+    """
+    check_folder(trials.output)
+    document: dict[str, Any] = {
+        "study": "public",
+        "seed": trials.seed,
+        "versions": {
+            name: importlib.metadata.version(name)
+            for name in ("handeye", "numpy", "opencv-contrib-python-headless")
+        },
+        "parts": {part.value: _part(part, kinhec, tracks, most, folder, data, trials) for part in parts},
+    }
+    written = write_results(trials.output, "public", document, lambda: ())
+    return Answer(document, lambda console: _show(console, document, written))
+
+
+def _part(
+    part: PublicPart,
+    kinhec: Path | None,
+    tracks: tuple[str, ...],
+    most: int | None,
+    folder: Path | None,
+    data: Data,
+    trials: Trials,
+) -> dict[str, Any]:
+    if part is PublicPart.SETS:
+        return _sets(data, trials)
+    if part is PublicPart.CELL:
+        from handeye.studies.rendered_cell import study_rendered_cell  # noqa: PLC0415
+
+        found: dict[str, Any] = {}
+        for arm in ("exact", "realistic"):
+            with progress(f"Calibrating on rendered pictures, arm {arm}") as advance:
+                result = study_rendered_cell(
+                    arm=arm, trials=trials.count(20), seed=trials.seed, progress=advance
+                )
+            found[arm] = result.to_dict()["cameras"]
+        return found
+    if part is PublicPart.KINHEC:
+        from handeye.studies.kinhec import study_kinhec  # noqa: PLC0415
+
+        if kinhec is None:
+            raise InputError(
+                "no folder of KinHEC",
+                code="no_data",
+                hint="kinhec generate --tier small --out FOLDER, then --kinhec FOLDER",
+            )
+        with progress("Running KinHEC's benchmark") as advance:
+            return study_kinhec(kinhec, tracks=tracks, most=most, progress=advance).to_dict()
+    if folder is None:
+        raise InputError("no folder of your own", code="no_data", hint="name one with --folder")
+    from handeye.importing import open_folder  # noqa: PLC0415
+    from handeye.studies.halves import study_halves  # noqa: PLC0415
+
+    return study_halves(open_folder(folder).recording)
+
+
+def _sets(data: Data, trials: Trials) -> dict[str, Any]:
+    from handeye.studies.data import SIMULATED_SETS, data_folder  # noqa: PLC0415
+    from handeye.studies.table1_parts import study_table1_parts  # noqa: PLC0415
+
+    recordings = data.load(SIMULATED_SETS, trials.processes)
+    with progress("Calibrating from random starts") as advance:
+        return study_table1_parts(
+            data_folder(data.data),
+            recordings,
+            trials=trials.count(20),
+            seed=trials.seed,
+            workers=trials.crew,
+            progress=advance,
+        ).to_dict()
+
+
+def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> None:
+    from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
+    from handeye.cli.wording import heading  # noqa: PLC0415
+
+    for part, found in document["parts"].items():
+        if part == PublicPart.SETS:
+            heading(console, "Table I taken apart", "next best view, mean error after 3 + 5 views")
+            _table(console, "row", {row: one["next_best_view"] for row, one in found["rows"].items()})
+            corners, camera = found["factor_of_corners"], found["factor_of_camera"]
+            console.print(f"factor of our corners {corners:.1f}, of a camera that may move {camera:.1f}")
+        elif part == PublicPart.CELL:
+            for arm, cameras in found.items():
+                heading(console, f"MoveIt Pro's cell, rendered, arm {arm}", "median of the starts, 8 views")
+                _table(console, "camera", cameras, ("stated_mm", "region_holds"))
+        elif part == PublicPart.KINHEC:
+            for track, one in found["tracks"].items():
+                held = one["region_holds"]
+                stated = "" if held is None else f", stated region holds {held:.1%}"
+                evidence = f"{one['sequences']} sequences{stated}"
+                heading(console, f"KinHEC {found['version']}, {track}", evidence)
+                _table(console, "solver", one["solvers"], ("answered",))
+        else:
+            evidence = f"{found['views']} views, difference of disjoint halves"
+            heading(console, found["name"], evidence)
+            _table(console, "method", found["methods"])
+    tables.show_written(console, written)
+
+
+def _table(
+    console: "Console", first: str, rows: Mapping[str, Mapping[str, Any]], more: tuple[str, ...] = ()
+) -> None:
+    """Print a row per name: translation, rotation, and what else is asked for."""
+    from handeye.cli import study_tables as tables  # noqa: PLC0415
+    from handeye.cli.wording import figures  # noqa: PLC0415
+
+    keys = ("translation_mm", "rotation_deg", *more)
+    table = tables.plain_table(first)
+    for column in ("mm", "deg", *(key.replace("_", " ") for key in more)):
+        table.add_column(column, justify="right")
+    for name, found in rows.items():
+        cells = [found[key] for key in keys]
+        texts = ["-" if c is None else str(c) if isinstance(c, int) else figures(c) for c in cells]
+        table.add_row(name.replace("_", " "), *texts)
+    console.print(table)

@@ -1,0 +1,76 @@
+"""How well the lens is known, in pixels: what its parameters leave open of where rays meet the image."""
+
+import numpy as np
+
+from handeye.estimation.confidence import PROBABILITY, radius
+from handeye.estimation.estimate import Estimate
+from handeye.types.arrays import FloatArray
+from handeye.types.camera import Camera
+
+# Pixels that are looked at, across and down.
+GRID = (9, 7)
+# Steps of numerical derivatives, in deviations.
+_STEP = 1e-3
+
+
+def lens_within_px(estimate: Estimate, probability: float = PROBABILITY) -> float:
+    """Return within how many pixels the lens is known with a probability.
+
+    The root mean square over the image of how far pixels are off, after the turn of the camera that explains
+    most of it: that turn is part of X. Zero where the camera is held.
+
+    Parameters
+    ----------
+    estimate
+        What is believed of the camera's free parameters, with the tails of Student's t.
+    """
+    free = estimate.free_camera
+    if not free:
+        return 0.0
+    covariance = estimate.covariance[12 : 12 + len(free), 12 : 12 + len(free)]
+    camera = estimate.camera
+    rays = _rays(camera)
+    deviations = np.sqrt(np.diag(covariance))
+    moved = np.empty((2 * len(rays), len(free)))
+    for column, (index, deviation) in enumerate(zip(free, deviations, strict=True)):
+        step = np.zeros(len(camera.parameters))
+        step[index] = _STEP * max(deviation, 1e-12)
+        ahead, _ = camera.with_parameters(camera.parameters + step).project(rays)
+        behind, _ = camera.with_parameters(camera.parameters - step).project(rays)
+        moved[:, column] = ((ahead - behind) / (2 * step[index])).ravel()
+    moved = _without_turn(moved, camera, rays)
+    # The mean square is a quadratic form of the parameters; its square root is the length of a vector.
+    root = np.linalg.cholesky(moved.T @ moved / len(rays) + 1e-18 * np.diag(1 / deviations**2))
+    return radius(root.T @ covariance @ root, estimate.degrees_of_freedom, probability)
+
+
+def lens_difference_px(camera: Camera, other: Camera) -> float:
+    """Return how far two cameras of one image size differ, as `lens_within_px` counts it."""
+    rays = _rays(camera)
+    here, _ = camera.project(rays)
+    there, seen = other.project(rays)
+    off = (there - here).reshape(-1, 1)
+    keep = np.repeat(seen, 2)
+    off = _without_turn(off[keep], camera, rays[seen])
+    return float(np.sqrt(np.sum(off**2) / max(int(seen.sum()), 1)))
+
+
+def _rays(camera: Camera) -> FloatArray:
+    """(N, 3) rays through the pixels that are looked at, as far as the lens sees there."""
+    width, height = camera.size_px
+    u, v = np.meshgrid(np.linspace(0, width - 1, GRID[0]), np.linspace(0, height - 1, GRID[1]))
+    rays, seen = camera.unproject(np.stack([u.ravel(), v.ravel()], axis=1))
+    return rays[seen]
+
+
+def _without_turn(off: FloatArray, camera: Camera, rays: FloatArray) -> FloatArray:
+    """Return pixel differences (2 N, n) without what a small turn of the camera explains."""
+    here, _ = camera.project(rays)
+    turns = np.empty((2 * len(rays), 3))
+    for axis in range(3):
+        turn = np.zeros(3)
+        turn[axis] = 1e-6
+        there, _ = camera.project(rays + np.cross(turn, rays))
+        turns[:, axis] = ((there - here) / 1e-6).ravel()
+    explained, *_ = np.linalg.lstsq(turns, off, rcond=None)
+    return off - turns @ explained

@@ -1,0 +1,154 @@
+"""What many trials cost: on one process, on several, on a Dask cluster of this machine, and after a break.
+
+A trial is a simulated calibration of the coverage study. Each way does the same trials, and the answers are
+compared to the last bit.
+"""
+
+import importlib
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handeye.compute.checkpoint import Checkpoint
+from handeye.compute.cluster import Cluster
+from handeye.compute.parallel import Workers
+from handeye.errors import InputError
+from handeye.simulation.cells import ErrorKind
+from handeye.studies.coverage import Case, Coverage, study_coverage
+
+CASE = Case("pixel_only", ErrorKind.PIXEL_ONLY)
+MILLION = 1_000_000
+SECONDS_PER_HOUR = 3600.0
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way to do the trials: what it took, and whether its answers are those of one process."""
+
+    name: str
+    processes: int
+    trials: int
+    seconds: float
+    same: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON, units in the keys."""
+        return {
+            "processes": self.processes,
+            "trials": self.trials,
+            "seconds": self.seconds,
+            "same_to_the_bit": self.same,
+            "million_hours": MILLION * self.seconds / self.trials / SECONDS_PER_HOUR,
+        }
+
+
+@dataclass(frozen=True)
+class Scale:
+    """All ways, the growth with the number of trials, and what a break costs."""
+
+    seed: int
+    ways: tuple[Way, ...]
+    growth: tuple[tuple[int, float], ...]
+    resumed_seconds: float
+    kept_seconds: float
+    kept_bytes: int
+    resumed_same: bool
+
+    @property
+    def exponent(self) -> float:
+        """Slope of the logarithm of the time over that of the number of trials: one where cost is linear."""
+        counts, seconds = np.log(np.array(self.growth, dtype=np.float64)).T
+        away = counts - counts.mean()
+        return float(away @ seconds / (away @ away))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON, units in the keys."""
+        trials = self.ways[0].trials
+        return {
+            "study": "scale",
+            "seed": self.seed,
+            "ways": {way.name: way.to_dict() for way in self.ways},
+            "growth": [{"trials": count, "seconds": seconds} for count, seconds in self.growth],
+            "growth_exponent": self.exponent,
+            "resume": {
+                "second_half_seconds": self.resumed_seconds,
+                "all_kept_seconds": self.kept_seconds,
+                "bytes_per_trial": self.kept_bytes / trials,
+                "same_to_the_bit": self.resumed_same,
+            },
+        }
+
+
+def study_scale(*, trials: int = 400, processes: int = 2, cluster: bool = True, seed: int = 0) -> Scale:
+    """Do the same trials in every way.
+
+    Parameters
+    ----------
+    trials
+        Number of trials; growth is measured at a quarter, half and all of it.
+    processes
+        Processes of this machine, and workers of the cluster.
+    cluster
+        Whether to start a Dask cluster on loopback; needs the extra `cluster`.
+
+    Raises
+    ------
+    InputError
+        Fewer than 40 trials, or no package `distributed`.
+    """
+    if trials < 40:
+        raise InputError(f"{trials} trials, expected at least 40", code="out_of_range")
+    growth = [(count, _timed(count, 1, seed)[1]) for count in (trials // 4, trials // 2)]
+    alone, seconds = _timed(trials, 1, seed)
+    growth.append((trials, seconds))
+    ways = [Way("one_process", 1, trials, seconds, same=True)]
+    found, seconds = _timed(trials, processes, seed)
+    ways.append(Way("processes", processes, trials, seconds, same=_same(found, alone)))
+    if cluster:
+        found, seconds = _on_cluster(trials, processes, seed)
+        ways.append(Way("dask", processes, trials, seconds, same=_same(found, alone)))
+    with tempfile.TemporaryDirectory() as folder:
+        kept = Checkpoint(Path(folder), 1)
+        _timed(trials // 2, kept, seed)
+        resumed, resumed_seconds = _timed(trials, kept, seed)
+        again, kept_seconds = _timed(trials, kept, seed)
+        size = sum(file.stat().st_size for file in Path(folder).rglob("*") if file.is_file())
+    same = _same(resumed, alone) and _same(again, alone)
+    return Scale(seed, tuple(ways), tuple(growth), resumed_seconds, kept_seconds, size, same)
+
+
+def _timed(trials: int, workers: Workers, seed: int) -> tuple[Coverage, float]:
+    began = time.perf_counter()
+    found = study_coverage(cases=[CASE], trials=trials, seed=seed, workers=workers)
+    return found, time.perf_counter() - began
+
+
+def _on_cluster(trials: int, workers: int, seed: int) -> tuple[Coverage, float]:
+    try:
+        distributed: Any = importlib.import_module("distributed")
+    except ImportError as error:
+        raise InputError(
+            "the package distributed is not installed",
+            code="missing_package",
+            hint="pip install 'handeye[cluster]', or leave the cluster out with --no-cluster",
+        ) from error
+    made = distributed.LocalCluster(
+        n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+    )
+    try:
+        return _timed(trials, Cluster(made.scheduler_address), seed)
+    finally:
+        made.close()
+
+
+def _same(one: Coverage, other: Coverage) -> bool:
+    return repr(_runs(one)) == repr(_runs(other))
+
+
+def _runs(coverage: Coverage) -> Sequence[object]:
+    return [run for runs in coverage.kinds.values() for run in runs]

@@ -1,0 +1,50 @@
+"""Calls into the core: panics are ordinary exceptions, and Ctrl-C is heard while it works."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from cells import Cell
+from handeye import _core
+from handeye.estimation import Measurements
+from handeye.robots import open_arm
+
+
+def inverse_kinematics() -> None:
+    far = np.tile(np.eye(4), (100_000, 1, 1))
+    far[:, 0, 3] = 5.0
+    open_arm("ur5e").inverse_all(far)
+
+
+def selection() -> None:
+    roots = np.random.default_rng(0).standard_normal((20_000, 12, 2))
+    _core.select_views(1e-3 * np.eye(12), roots @ roots.transpose(0, 2, 1), 15_000, "entropy")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends a signal to itself")
+@pytest.mark.parametrize("work", [inverse_kinematics, selection])
+def test_work_that_takes_an_hour_can_be_interrupted(work: Callable[[], None]) -> None:
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            work()
+    finally:
+        timer.cancel()
+
+
+def test_a_panic_is_an_ordinary_exception() -> None:
+    cell = Cell(np.random.default_rng(0))
+    views = cell.views([cell.robot_pose(cell.look()) for _ in range(4)], sigma_px=0.1)
+    measurements = Measurements.of(cell.mounting, cell.camera, cell.target, views)
+    seen = _core.PoseMeasurements(measurements.problem, measurements.camera_poses, free_camera=None)
+    poses, none = measurements.motions, np.zeros((0, 4, 4))
+    measured = [(0, 0, seen, [0, 1, 2, 3], [1.0] * 4)]
+    with pytest.raises(Exception, match=r"the core failed|start"):
+        _core.estimate_cell(
+            poses, [(True, 0, False, None)], [False], measured, start=(none, none), pairs=2, most_rounds=2
+        )

@@ -1,0 +1,79 @@
+"""The gain of a station seen by several cameras: the robot's error is shared, and what is asked for counts."""
+
+import numpy as np
+import pytest
+
+from handeye.errors import InputError
+from handeye.estimation import RigEstimate, RigMeasurements, estimate_rig
+from handeye.planning.candidates import Pool
+from handeye.planning.prediction import Sight
+from handeye.planning.rig import RigRequest, rig_gains
+from handeye.robots import ArmKinematics, open_arm
+from handeye.simulation.cells import ErrorKind
+from handeye.simulation.rigs import RigOptions, simulate_rig
+from handeye.types import Pose, RigRecording
+
+KNOWN = ArmKinematics(open_arm("ur5e"))
+
+
+@pytest.fixture(scope="module")
+def recording() -> RigRecording:
+    """Ten stations; the last two are left to choose from."""
+    return simulate_rig(ErrorKind.MIXTURE_CELL, 1, RigOptions(stations=14))
+
+
+def estimated(recording: RigRecording, count: int, *, known: bool = True) -> RigEstimate:
+    first = recording.with_stations(recording.stations[:count])
+    return estimate_rig(RigMeasurements.of(first), KNOWN if known else None)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_gains_are_what_the_covariances_lose(recording: RigRecording, known: bool) -> None:
+    """Taken alone, the predicted gain of a camera agrees with what its covariance loses with the station."""
+    before = estimated(recording, 8, known=known)
+    pool = Pool.of_views(station.views[0].view for station in recording.stations[8:])
+    found = rig_gains(before, pool, {}, Sight())
+    assert found.best is not None
+    assert np.nanmin(found.gains) > 0
+    for i, pairs in found.seen.items():
+        seen = {
+            (v.camera, v.target) for v in recording.stations[8 + i].views if v.camera in {"left", "right"}
+        }
+        assert seen <= set(pairs)
+
+
+def test_what_is_asked_for_decides(recording: RigRecording) -> None:
+    before = estimated(recording, 6)
+    pool = Pool.of_views(station.views[0].view for station in recording.stations[6:])
+    hand, between = (
+        rig_gains(before, pool, {names: 2.0}, Sight()).gains for names in (("left",), ("left", "right"))
+    )
+    assert not np.allclose(hand, between, equal_nan=True)
+    # Two cameras in each other: the arm's error, which they share, takes nothing away.
+    assert np.nanmax(between) > 0
+
+
+def test_shared_error_of_the_robot_is_counted_once(recording: RigRecording) -> None:
+    """Were the error new for each camera, four cameras would teach more of the arm than they do."""
+    before = estimated(recording, 6, known=False)
+    pool = Pool.of_views(station.views[0].view for station in recording.stations[6:])
+    wanted = {("left",): 2.0}
+    together = rig_gains(before, pool, wanted, Sight()).gains
+    assert np.all(np.isfinite(together))
+    assert np.nanmax(together) < 5
+
+
+def test_a_request_names_what_it_lacks(recording: RigRecording) -> None:
+    estimate = estimated(recording, 14)
+    assert RigRequest(100.0, 10.0).missing(estimate) == {}
+    tight = RigRequest(1e-3, 1e-3, cameras=("left",), camera_to_camera=(1e-3, 1e-3)).missing(estimate)
+    assert set(tight) == {("left",), ("left", "right"), ("front", "side")}
+    assert all(factor > 1 for factor in tight.values())
+    with pytest.raises(InputError):
+        RigRequest(0.0, 1.0)
+
+
+def test_an_empty_sight_gains_nothing(recording: RigRecording) -> None:
+    before = estimated(recording, 8)
+    away = Pool.of_poses([Pose.exp([5.0 + k, 5.0, 5.0, 0, 0, 0]) for k in range(5)])
+    assert rig_gains(before, away, {}, Sight()).best is None

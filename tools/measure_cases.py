@@ -1,0 +1,205 @@
+"""Measure how data that people have got wrong are answered, each kind varied.
+
+    python tools/measure_cases.py --count 20
+
+Made-up cells, the camera in the hand and beside the robot in turns, boards of three sizes, 6 to 14 views,
+pixel noise of 0.05 to 0.2 px, robot noise of 0 to 0.2 mm and 0.02 deg, each set from its number. Kinds:
+
+size       a camera file of another size                           must be refused
+pinhole    a lens of mild distortion given as one without any      a region that holds the truth
+decimals   rotations and positions rounded to 4 decimals           a region that holds the truth
+dots       a camera_info file whose numbers end in dots            a region that holds the truth
+signs      Euler angles with signs turned                          refused, or a region that holds the truth
+readings   poses read in a convention of another robot             the same
+mirrored   pictures flipped                                        the same
+inverse    base in flange                                          the same
+gimbal     a pan-tilt unit, base in flange                         the same
+stale      the pose of the view before, in pairs or throughout     the same
+
+Right is what the list says. A region holds the truth if the camera's centre is off by no more than the stated
+95 % radius; where an answer is due, one in twenty may miss it. Wrong is an answer beyond that radius and
+beyond 3 mm.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+
+from cells import Cell
+from handeye.datasets import read_camera, write_recording
+from handeye.errors import HandeyeError
+from handeye.estimation import solve
+from handeye.estimation.confidence import within
+from handeye.importing import SourceOptions, open_folder
+from handeye.notations import NOTATIONS
+from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Truth, View
+
+BOARDS = (Chessboard(6, 9, 0.025), Chessboard(7, 9, 0.03), Chessboard(8, 11, 0.02))
+LENS = [1200.0, 1200.0, 639.5, 511.5, -0.1, 0.05, 5e-4, -5e-4, 0.0]
+WRONG_M = 3e-3
+DUE = frozenset({"pinhole", "decimals", "dots"})
+READINGS = (
+    ("kuka", "euler_xyz_fixed_deg"), ("ur", "euler_xyz_fixed_rad"), ("doosan", "kuka"), ("kuka", "doosan"),
+    ("fanuc", "kuka"), ("staubli", "fanuc"), ("quaternion_xyzw", "quaternion_wxyz"),
+    ("euler_xyz_fixed_rad", "ur"),
+)  # fmt: skip
+
+
+def cell_of(number: int, seed: int, kind: str) -> tuple[Recording, np.random.Generator]:
+    """The right recording of a number, with its truth."""
+    random = np.random.default_rng([seed, number, sum(map(ord, kind))])
+    mounting = (Mounting.EYE_IN_HAND, Mounting.EYE_TO_HAND)[number % 2]
+    camera = Camera("brown_conrady_5", LENS, 1280, 1024)
+    if kind == "pinhole":
+        mild = [*random.uniform([-0.06, -0.05], [0.06, 0.05]), *random.uniform(-3e-4, 3e-4, 2), 0.0]
+        camera = Camera("brown_conrady_5", [*LENS[:4], *mild], 1280, 1024)
+    cell = Cell(random, mounting, BOARDS[number % 3], camera)
+    count = int(random.integers(6, 15))
+    if kind == "gimbal":
+        reported = pan_tilt(random, cell, count)
+    else:
+        reported = [cell.robot_pose(cell.look(0.5, 1.0)) for _ in range(count)]
+    level = random.uniform(0, 2e-4)
+    noise = [level] * 3 + [np.deg2rad(level * 100)] * 3
+    true = [pose @ Pose.exp(random.normal(size=6) * noise) for pose in reported]
+    views = cell.views(true, sigma_px=float(random.uniform(0.05, 0.2)))
+    views = [with_pose(view, pose) for view, pose in zip(views, reported, strict=True)]
+    truth = Truth(cell.X, cell.Y)
+    return Recording("case", mounting, camera, cell.target, tuple(views), truth, "made up"), random
+
+
+def pan_tilt(random: np.random.Generator, cell: Cell, count: int) -> list[Pose]:
+    """Poses that turn about two axes through one place."""
+    first = cell.robot_pose(cell.look(0.1, 0.1))
+    cell.X = Pose.exp([*random.uniform(-0.02, 0.02, 3), *random.uniform(-0.5, 0.5, 3)])
+    seen = cell.look(0.1, 0.1)
+    A = cell.mounting.chain(first)
+    cell.Y = A.inverse() @ cell.X.inverse() @ seen
+    turns = [Pose.exp([0, 0, 0, *random.uniform(-0.25, 0.25, 2), 0]) for _ in range(count)]
+    return [first @ turn for turn in turns]
+
+
+def with_pose(view: View, pose: Pose) -> View:
+    """The view with another pose of the robot."""
+    return View(view.name, pose, view.point_ids, view.pixels)
+
+
+def posed(recording: Recording, poses: list[Pose], camera: Camera | None = None) -> Recording:
+    """The recording with other poses, and another camera."""
+    views = tuple(with_pose(v, p) for v, p in zip(recording.views, poses, strict=True))
+    r = recording
+    return Recording(r.name, r.mounting, camera or r.camera, r.target, views, r.truth, r.source)
+
+
+def spoilt(
+    kind: str, recording: Recording, random: np.random.Generator, folder: Path
+) -> tuple[Recording, Camera | None]:
+    """The recording as someone has got it wrong, and a camera to give with it."""
+    poses = [view.T_base_flange for view in recording.views]
+    if kind == "size":
+        width, height = (int(v * random.uniform(0.4, 2.5)) for v in recording.camera.size_px)
+        return recording, Camera("brown_conrady_5", LENS, width + 1, height)
+    if kind == "pinhole":
+        return posed(recording, poses, Camera("pinhole", LENS[:4], 1280, 1024)), None
+    if kind == "dots":
+        return recording, read_camera(camera_info(folder, recording.camera))
+    return posed(recording, changed(kind, poses, random)) if kind != "mirrored" else flipped(
+        recording, random
+    ), None
+
+
+def changed(kind: str, poses: list[Pose], random: np.random.Generator) -> list[Pose]:
+    """Poses as someone has got them wrong."""
+    if kind == "decimals":
+        return [Pose(np.round(pose.matrix, 4)) for pose in poses]
+    if kind in {"inverse", "gimbal"}:
+        return [pose.inverse() for pose in poses]
+    if kind == "stale":
+        every = int(random.choice([2, 3, len(poses)]))
+        return [poses[k - k % every] for k in range(len(poses))]
+    if kind == "signs":
+        signs = np.array(
+            [1, 1, 1, *random.choice([[-1, -1, -1], [1, -1, 1], [-1, 1, 1], [1, 1, -1], [-1, -1, 1]])]
+        )
+        notation = NOTATIONS["euler_xyz_fixed_deg"]
+        return [notation.pose((signs * notation.numbers(pose)).tolist()) for pose in poses]
+    written, read = (NOTATIONS[name] for name in READINGS[int(random.integers(len(READINGS)))])
+    return [read.pose(written.numbers(pose)) for pose in poses]
+
+
+def flipped(recording: Recording, random: np.random.Generator) -> Recording:
+    """The recording with its pictures mirrored left to right, or upside down."""
+    axis = int(random.integers(2))
+    size = recording.camera.size_px[axis]
+
+    def mirrored(view: View) -> View:
+        pixels = view.pixels.copy()
+        pixels[:, axis] = size - 1 - pixels[:, axis]
+        return View(view.name, view.T_base_flange, view.point_ids, pixels)
+
+    r = recording
+    return Recording(r.name, r.mounting, r.camera, r.target, tuple(map(mirrored, r.views)), r.truth, r.source)
+
+
+def camera_info(folder: Path, camera: Camera) -> Path:
+    """A file as camera_calibration_parsers writes it, with numbers as NumPy prints them."""
+    fx, fy, cx, cy, *distortion = (f"{v:.6f}".rstrip("0") for v in camera.parameters)
+    path = folder / "camera.yaml"
+    path.write_text(
+        f"image_width: {camera.width_px}\nimage_height: {camera.height_px}\n"
+        "camera_matrix:\n  rows: 3\n  cols: 3\n"
+        f"  data: [{fx}, 0., {cx}, 0., {fy}, {cy}, 0., 0., 1.]\ndistortion_model: plumb_bob\n"
+        f"distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [{', '.join(distortion)}]\n"
+    )
+    return path
+
+
+def outcome(kind: str, number: int, seed: int) -> tuple[str, str]:
+    """What comes of one set: refused, holds, misses or wrong, and what is said."""
+    recording, random = cell_of(number, seed, kind)
+    truth = recording.truth
+    assert truth is not None
+    with tempfile.TemporaryDirectory() as parent:
+        given, camera = spoilt(kind, recording, random, Path(parent))
+        folder = Path(parent) / "set"
+        write_recording(given, folder)
+        try:
+            calibration = solve(open_folder(folder, SourceOptions(camera=camera)).recording)
+        except HandeyeError as error:
+            return "refused", f"{error.code}: {error.message[:160]}"
+    # The twist of X moves the camera's centre by its translation.
+    off = float(np.linalg.norm((truth.X @ calibration.X.inverse()).log()[:3]))
+    radius = within(calibration.covariance, calibration.degrees_of_freedom).translation_mm / 1e3
+    if off <= radius:
+        return "holds", ""
+    return ("wrong" if off > WRONG_M else "misses"), f"{1e3 * off:.3g} mm off, stated {1e3 * radius:.3g} mm"
+
+
+KINDS = ("size", "pinhole", "decimals", "dots", "signs", "readings", "mirrored", "inverse", "gimbal", "stale")
+
+
+def main() -> None:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--kind", choices=KINDS, action="append")
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    for kind in arguments.kind or KINDS:
+        results = [outcome(kind, number, arguments.seed) for number in range(arguments.count)]
+        for number, (result, said) in enumerate(results):
+            if result == "wrong" or (result == "refused" and kind in DUE):
+                print(f"  {kind} {number} {result}: {said}")
+        counts = {
+            name: sum(r == name for r, _ in results) for name in ("refused", "holds", "misses", "wrong")
+        }
+        print(f"{kind}: " + ", ".join(f"{count} {name}" for name, count in counts.items()), flush=True)
+
+
+if __name__ == "__main__":
+    main()
