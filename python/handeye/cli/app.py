@@ -12,6 +12,7 @@ COMMANDS = (
     ("validate", "handeye.cli.validate:validate", "Test how far a calibration holds."),
     ("check", "handeye.cli.check:check", "Test whether camera, board and arm still are where they were."),
     ("diff", "handeye.cli.diff:diff", "Say how two calibrations of one camera differ."),
+    ("arm", "handeye.cli.corrected:corrected", "Write the arm as it is built, as the views have it."),
     ("import", "handeye.cli.importing:import_folder", "Turn images and robot poses into a recording."),
     ("export", "handeye.cli.export:export", "Write the answer in the format of another program."),
     ("report", "handeye.cli.report:report", "Write one page about a calibration."),

@@ -6,9 +6,9 @@ The twist between chain and picture of a new view is, as in the default model,
 
 with theta as far off as the old views leave it, of covariance S, and the noise that they found. Stacked, the
 twists have the covariance ``V = B S B' + blockdiag(noise)`` if nothing has moved, and ``e' V^-1 e`` over
-their number is F distributed. What moved is one of three: the camera (a twist of X), the board (a twist of Y), or
-one joint whose zero shifted. Each is fitted by generalised least squares, and what the misfit falls by is
-tested (the generalised likelihood ratio of Gaussian models, e.g. Kay, "Fundamentals of Statistical Signal
+their number is F distributed. What moved is one of three: the camera (a twist of X), the board (a twist of
+Y), or one joint whose zero shifted. Each is fitted by generalised least squares, and what the misfit falls by
+is tested (the generalised likelihood ratio of Gaussian models, e.g. Kay, "Fundamentals of Statistical Signal
 Processing: Detection Theory", 1998, section 7.7).
 """
 
