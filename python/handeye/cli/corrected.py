@@ -56,8 +56,8 @@ def corrected(
         raise DegenerateError("the views say nothing of the arm")
     twists = kinematics.link_twists @ correction.displacements
     built = corrected_arm(described, twists, correction.joint_offsets)
-    joints = np.array([view.joints_rad for view in opened.recording.views], dtype=float)
-    moved = built.forward(joints)[:, :3, 3] - described.forward(joints)[:, :3, 3]
+    joints = np.array([view.joints_rad or () for view in opened.recording.views], dtype=float)
+    moved = (built.forward(joints) - described.forward(joints))[:, :3, 3]
     note = f"{described.name} as {len(calibration.used)} views of {opened.recording.name} have it, by handeye"
     replace_file(output, urdf_of(built, [note]).encode())
     data: dict[str, Any] = {
@@ -66,7 +66,7 @@ def corrected(
         "urdf": str(output),
         "joint_zeros": [offset.to_dict() for offset in calibration.joint_offsets],
         "link_errors": [error.to_dict() for error in calibration.link_errors],
-        "flange_moves_mm": 1e3 * float(np.sqrt(np.mean(np.sum(moved**2, axis=1)))),
+        "flange_moves_mm": 1e3 * float(np.linalg.norm(moved)) / len(moved) ** 0.5,
     }
     return Answer(data, lambda console: _show(console, data))
 

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handeye.robots.model import Arm
+from handeye.robots.model import Arm, Joint
 from handeye.types.arrays import FloatArray, finite_array
 from handeye.types.pose import Pose
 
@@ -38,7 +38,7 @@ def corrected_arm(arm: Arm, link_twists: ArrayLike, joint_offsets: ArrayLike) ->
     """
     twists = finite_array(link_twists, (len(arm), 6), "link twists")
     offsets = finite_array(joint_offsets, (len(arm),), "joint offsets")
-    joints = []
+    joints: list[Joint] = []
     for joint, twist, offset in zip(arm.joints, twists, offsets, strict=True):
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         screw = np.zeros(6)

@@ -18,6 +18,7 @@ from handeye.types.calibration import ModelName
 # Views that calibrate, and those whose postures a check may go to.
 CALIBRATION, POSTURES = 10, 30
 RANDOM_VIEWS = (2, 3, 4, 6)
+HALF = 0.5
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ def _shifted(
     zeros: FloatArray = np.zeros(len(simulated_arm()))
     away = random.standard_normal(3)
     twist: FloatArray = np.zeros(6)
-    twist[:3] = size_m * away / np.linalg.norm(away)
+    twist[:3] = size_m * away / float(np.linalg.norm(away))
     shift = Pose.exp(twist)
     if moved is Moved.CAMERA:
         return replace(cell, X=shift @ cell.X), zeros, ""
@@ -162,8 +163,8 @@ def _shifted(
     joint = int(random.choice(estimate.arm.free))
     name = estimate.arm.kinematics.joint_names[joint]
     columns = rows_of(estimate, views).shifts[Moved.JOINT, name].reshape(-1, 6)
-    lever = float(np.sqrt(np.mean(np.sum(columns[:, :3] ** 2, axis=1))))
-    zeros[joint] = size_m / lever * (1.0 if random.uniform() < 0.5 else -1.0)
+    lever = float(np.linalg.norm(columns[:, :3])) / len(columns) ** 0.5
+    zeros[joint] = size_m / lever * (1.0 if random.uniform() < HALF else -1.0)
     return cell, zeros, name
 
 
