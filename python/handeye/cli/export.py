@@ -1,7 +1,7 @@
 """`handeye export`: the answer in the formats of others."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,9 +16,10 @@ from handeye.cli.solve_poses import ONLY_POSES
 from handeye.cli.source import Source
 from handeye.datasets import PosePairs
 from handeye.datasets.writing import replace_file
-from handeye.estimation import solve
+from handeye.errors import InputError
+from handeye.estimation import solve, solve_rig
 from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text, moveit_samples, read_result
-from handeye.importing import PosesSolved, solve_poses
+from handeye.importing import OpenedRig, PosesSolved, is_rig, solve_poses
 from handeye.types import Pose
 from handeye.types.calibration import ModelName
 
@@ -124,12 +125,12 @@ def export(
         return _answer(format, moveit_samples(source.open(result).recording), output, (), {})
     if is_folder:
         answer = _solved(result, source, model or ModelName.AUTO, reduced=reduced)
-    elif source != Source() or model is not None or reduced:
+    elif replace(source, only=None) != Source() or model is not None or reduced:
         raise UsageError(
             "a result is solved already", hint="leave the options for folders away, or give the folder"
         )
     else:
-        answer = read_result(result)
+        answer = read_result(result, source.only)
     mount = Mount(answer, names.frames(Frames.usual(answer.mounting)))
     data = {
         "parent_frame": mount.parent,
@@ -139,7 +140,28 @@ def export(
     return _answer(format, checked_text(EXPORTERS[format], mount), output, mount.warnings, data)
 
 
+def _of_rig(opened: OpenedRig, only: str | None, *, reduced: bool) -> Result:
+    names = list(opened.recording.cameras)
+    if only not in names:
+        asked = "" if only is None else f"no camera {only[:60]!r}; "
+        raise InputError(
+            f"{asked}{len(names)} cameras ({', '.join(names)})",
+            code="several_cameras",
+            hint="name one with --only",
+        )
+    rig = solve_rig(opened.recording, reduced=reduced)
+    if rig.targets_of[only] is None:
+        raise InputError(
+            f"camera {only}: saw no target that the arm moves against it, and formats name one",
+            code="not_tied",
+            hint="take its pose from the JSON of handeye solve",
+        )
+    return Result.of(rig.cameras[only], opened.recording.name, [*map(str, opened.warnings), *rig.warnings])
+
+
 def _solved(folder: Path, source: Source, model: ModelName, *, reduced: bool) -> Result:
+    if is_rig(folder):
+        return _of_rig(source.open_rig(folder), source.only, reduced=reduced)
     opened = source.open_any(folder)
     if isinstance(opened, PosePairs):
         return _of_poses(solve_poses(opened))

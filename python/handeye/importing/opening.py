@@ -75,6 +75,11 @@ class SourceOptions:
         What counts in a bag.
     arm
         The robot, whose joints a bag or a file of poses may have in place of poses.
+
+    Examples
+    --------
+    >>> SourceOptions(poses="poses.csv").poses
+    'poses.csv'
     """
 
     layout: str | None = None
@@ -146,6 +151,12 @@ def open_folder(
         The views do not determine the camera.
     DetectionError
         The target is in none of the images.
+
+    Examples
+    --------
+    >>> from handeye.datasets.shipped import shipped_recording
+    >>> open_folder(shipped_recording()).recording.mounting.value
+    'eye_in_hand'
     """
     opened = open_any(path, options, progress=progress)
     if isinstance(opened, PosePairs):
