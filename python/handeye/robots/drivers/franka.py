@@ -83,8 +83,10 @@ class FrankaRobot:
             share = franky.RelativeDynamicsFactor(1.0, ACCELERATION_SHARE, JERK_SHARE)
             target = franky.JointState(np.array(goal.joints_rad, dtype=np.float64))
             arm.move(franky.JointMotion(target, relative_dynamics_factor=share), asynchronous=True)
-            while arm.poll_motion():
+            # `poll_motion` of franky 2.0 says the opposite of its documentation, and is not asked.
+            while arm.is_in_control:
                 time.sleep(POLL_S)
+            arm.join_motion(STOPPED_S)  # raises what ended it
         except franky.Exception as error:
             raise self._described(goal.label, error) from error
         self._settled(arm)
