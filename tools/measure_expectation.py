@@ -2,8 +2,8 @@
 
     .venv/bin/python tools/measure_expectation.py --cells 25
 
-Four kinds of cells, so 100 with 25 each, of seeds that the prediction does not use. Prints the mean error foretold
-and reached after 6, 9 and 12 views (mm, deg), and the ratio of the two.
+Four kinds of cells, so 100 with 25 each, of seeds that the prediction does not use. Prints the mean error
+foretold and reached after 6, 9 and 12 views (mm, deg), and the ratio of the two.
 """
 
 import argparse
