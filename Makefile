@@ -26,7 +26,7 @@ say = @printf '== %s\n'
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test check bench docs build lock clean distclean FORCE
+.PHONY: help demo test check bench docs build wheels lock clean distclean FORCE
 
 help: ## list the targets
 	@printf 'handeye: make TARGET, one of\n'
@@ -72,6 +72,19 @@ docs: $(STAMPS)/dev ## build the documentation into docs/_build/html
 
 build: $(STAMPS)/core ## build the Rust extension and install the package, editable, into .venv
 
+# Robots run on both. A wheel serves every Python from 3.11 on and needs no Rust where it is installed.
+ARM_TARGET := aarch64-unknown-linux-gnu
+wheels: $(STAMPS)/run ## build dist/*.whl for this machine, and for 64-bit ARM where its Rust target is installed
+	$(say) 'maturin build: this machine'
+	@$(BIN)/maturin build --release --locked --out dist
+	@if [ -d "$$(rustc --print sysroot)/lib/rustlib/$(ARM_TARGET)/lib" ]; then \
+		printf '== %s\n' 'maturin build: $(ARM_TARGET)' && \
+		$(BIN)/maturin build --release --locked --out dist --target $(ARM_TARGET); \
+	else \
+		printf '== %s\n' 'no wheel for 64-bit ARM; to have it: rustup target add $(ARM_TARGET), and aarch64-linux-gnu-gcc'; \
+	fi
+	@ls -l dist
+
 $(STAMPS)/run: requirements/run.txt
 	@command -v $(PYTHON) >/dev/null || { echo 'Python 3.11 or later is needed: make PYTHON=/path/to/python3' >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -108,7 +121,7 @@ lock: requirements/pins.txt pyproject.toml ## resolve requirements/*.txt from py
 
 clean: ## remove what was built; keep .venv
 	$(say) 'removing build products and caches'
-	@rm -rf target build docs/_build out .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	@rm -rf target build dist docs/_build out .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	@rm -f python/handeye/_core*.so python/handeye/_core*.pyd $(STAMPS)/core
 	@find python tests -name __pycache__ -type d -prune -exec rm -rf {} +
 

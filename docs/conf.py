@@ -3,6 +3,9 @@
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "docs" / "_extensions"))
@@ -12,7 +15,7 @@ author = "the handeye contributors"
 project_copyright = "the handeye contributors"
 version = release = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
 
-extensions = ["myst_parser", "mathml_formulas"]
+extensions = ["myst_parser", "mathml_formulas", "generated_reference"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build", "_extensions"]
@@ -26,3 +29,17 @@ html_math_renderer = "mathml"
 html_show_sphinx = False
 html_copy_source = False
 html_theme_options = {"navigation_with_keys": True}
+
+
+def levels_of_captions(app: Sphinx, name: str, template: str, context: dict[str, Any], *rest: object) -> None:
+    """Say of captions, which are headings to a screen reader, of which level they are."""
+    del app, name, template, rest
+    plain = '<p class="caption" role="heading">'
+    for part in ("furo_navigation_tree", "body"):
+        if text := context.get(part):
+            context[part] = text.replace(plain, plain[:-1] + ' aria-level="2">')
+
+
+def setup(app: Sphinx) -> None:
+    """Come after the theme, which makes the side bar."""
+    app.connect("html-page-context", levels_of_captions, priority=900)

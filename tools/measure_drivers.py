@@ -1,7 +1,9 @@
 """Whole calibrations by `handeye run` through the protocols of devices on loopback, judged by the truth.
 
-A cell with a truth stands behind a controller (`--robot ur`) and a camera: pylon's emulator of cameras, which
-needs the extra basler (`--camera basler`), or the cell itself (`--camera mock`). Pictures are rendered.
+A cell with a truth stands behind a controller and a camera; pictures are rendered. The controller is the
+mock of Universal Robots (`--robot ur`) or franky-sim (`--robot franka`, which needs franky-control and
+franky-sim), whose arm MuJoCo moves; the camera sees it there, with the errors of the cell's arm
+on top. The camera is pylon's emulator (`--camera basler`, extra basler) or the cell itself (`--camera mock`).
 
 python tools/measure_drivers.py --camera basler --seeds 1 2 3
 """
@@ -12,15 +14,21 @@ import json
 import os
 import tempfile
 import time
-from contextlib import redirect_stdout
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
 from handeye import extension
+from handeye.cameras.protocol import Frame
 from handeye.cli.boundary import run
+from handeye.robots import read_urdf
+from handeye.robots.drivers.franka import FrankaRobot
+from handeye.robots.protocol import Goal
 from handeye.session import drivers
 from handeye.testing import MockCell
 from handeye.testing.universal_robots import MockUniversalRobot
@@ -75,19 +83,64 @@ def of_the_cell(cell: Shown) -> str:
     return "mock"
 
 
-def calibrated(arguments: argparse.Namespace, seed: int, folder: Path) -> dict[str, object]:
-    """Run one calibration; return what came of it."""
+@contextmanager
+def universal_robot(arguments: argparse.Namespace, seed: int) -> Iterator[tuple[Shown, str, str]]:
+    """Give a cell, the specification of its driver and the description of its arm."""
     cell = Shown("ur5e", seed=seed)
     controller = MockUniversalRobot(cell, pace=arguments.pace)
-    camera, target = cell.write(folder)
-    images = emulated(cell, folder) if arguments.camera == "basler" else of_the_cell(cell)
-    command = ["run", "--session", str(folder / "session"), "--robot", "ur5e", "--no-confirm", "--json"]
-    command += ["--driver", f"ur:{controller.address}", "--images", images, "--speed-deg-s", "60"]
-    command += ["--camera", str(camera), "--target", str(target), "--workspace-mm", *SPACE_MM]
+    try:
+        yield cell, f"ur:{controller.address}", "ur5e"
+    finally:
+        controller.close()
+
+
+class Followed(Shown):
+    """A cell whose arm stands where the simulation of others has it."""
+
+    qpos: Any = None
+
+    def grab(self, label: str) -> Frame:
+        """Look from where the simulated arm stands now."""
+        if self.qpos is not None:
+            self.stand(tuple(np.clip(self.qpos()[:7], *self.arm.limits.T).tolist()))
+        return super().grab(label)
+
+
+@contextmanager
+def franka(_: argparse.Namespace, seed: int) -> Iterator[tuple[Shown, str, str]]:
+    """Give a cell, the specification of its driver and the description of its arm."""
+    import franky_sim  # noqa: PLC0415 - only where it is asked for
+    from franky_sim.mujoco_simulator import MujocoSimulator  # noqa: PLC0415
+
+    described = Path(franky_sim.__file__).parent / "assets" / "fr3_clean.urdf"
+    cell = Followed(read_urdf(described), seed=seed)
+    with MujocoSimulator(enable_visualization=False) as simulator:
+        model = simulator.add_robot()
+        with franky_sim.SimulationServer(simulator) as server:
+            server.run_async()
+            address = f"{model.hostname},no-realtime"
+            driver = FrankaRobot(address)
+            start = cell.start_rad
+            driver.move_to(Goal("start.1", Pose(cell.arm.forward(start)), start, 1.0))
+            del driver
+            cell.qpos = lambda: np.array(model.inner_state.q)
+            yield cell, f"franka:{address}", str(described)
+
+
+ROBOTS = {"ur": universal_robot, "franka": franka}
+
+
+def calibrated(arguments: argparse.Namespace, seed: int, folder: Path) -> dict[str, object]:
+    """Run one calibration; return what came of it."""
     printed, began = io.StringIO(), time.monotonic()
-    with redirect_stdout(printed):
-        run(command)
-    controller.close()
+    with ROBOTS[arguments.robot](arguments, seed) as (cell, driver, arm):
+        camera, target = cell.write(folder)
+        images = emulated(cell, folder) if arguments.camera == "basler" else of_the_cell(cell)
+        command = ["run", "--session", str(folder / "session"), "--robot", arm, "--no-confirm", "--json"]
+        command += ["--driver", driver, "--images", images, "--speed-deg-s", "60"]
+        command += ["--camera", str(camera), "--target", str(target), "--workspace-mm", *SPACE_MM]
+        with redirect_stdout(printed):
+            run(command)
     answer = json.loads(printed.getvalue())
     if "error" in answer:
         return {"seed": seed, "error": answer["error"]["message"]}
@@ -108,7 +161,7 @@ def calibrated(arguments: argparse.Namespace, seed: int, folder: Path) -> dict[s
 def main() -> None:
     """Print a line a seed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--robot", choices=["ur"], default="ur")
+    parser.add_argument("--robot", choices=[*ROBOTS], default="ur")
     parser.add_argument("--camera", choices=["basler", "mock"], default="mock")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--pace", type=float, default=4.0, help="so many times faster than stated")

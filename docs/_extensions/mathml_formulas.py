@@ -1,6 +1,8 @@
 """Write formulas as MathML, which browsers draw by themselves: no script, no font, no LaTeX.
 
 A formula that cannot be converted is a warning that names the page and line, and so an error in `make docs`.
+Browsers stretch brackets only with a font made for mathematics, which few machines have: the brackets of a
+matrix are drawn as its borders instead (`formulas.css`), and others that would have to grow are refused.
 """
 
 import xml.etree.ElementTree as ET
@@ -15,21 +17,42 @@ from sphinx.util.typing import ExtensionMetadata
 from sphinx.writers.html5 import HTML5Translator
 
 logger = logging.getLogger(__name__)
+MATHML = "http://www.w3.org/1998/Math/MathML"
+BRACKETED = [f"{{{MATHML}}}{name}" for name in ("mo", "mtable", "mo")]
+ET.register_namespace("", MATHML)
 
 
 def to_mathml(node: nodes.Element, display: str) -> str:
     """The formula of `node` as one `<math>` element; on failure its LaTeX source, and a warning."""
     latex = node.astext()
     try:
-        mathml = convert(latex, display=display)
+        root = ET.fromstring(convert(latex, display=display))
         # What it does not know, the converter passes on: a command as text, a stray & as markup.
-        unknown = [part for part in ET.fromstring(mathml).itertext() if "\\" in part]
+        unknown = [part for part in root.itertext() if "\\" in part]
         if unknown:
             raise ValueError(f"unknown command {unknown[0]}")
-        return mathml
+        draw_brackets(root)
+        return ET.tostring(root, encoding="unicode")
     except Exception as error:  # noqa: BLE001 - the converter raises many classes; each becomes a named warning
         logger.warning("formula not understood (%s): %s", error, latex, location=node)
         return f"<code>{escape(latex)}</code>"
+
+
+def draw_brackets(root: ET.Element) -> None:
+    """Make the brackets around matrices part of the matrix; refuse others that would have to stretch."""
+    for parent in list(root.iter()):
+        parts = list(parent)
+        for opening, matrix, closing in zip(parts, parts[1:], parts[2:], strict=False):
+            tags = [opening.tag, matrix.tag, closing.tag]
+            if tags == BRACKETED and (opening.text, closing.text) == ("[", "]"):
+                matrix.set("class", "matrix")
+                parent.remove(opening)
+                parent.remove(closing)
+    for operator in root.iter(f"{{{MATHML}}}mo"):
+        if operator.get("fence") == "true" and operator.get("stretchy") == "true":
+            raise ValueError(
+                f"a bracket that browsers do not stretch: {operator.text}; write it without \\left"
+            )
 
 
 def visit_inline(translator: HTML5Translator, node: nodes.math) -> None:

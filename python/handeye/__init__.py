@@ -5,6 +5,15 @@
 >>> calibration = handeye.solve(opened.recording)
 >>> calibration.results["T_flange_camera"]
 
+From views to an answer: `open_folder` (with `SourceOptions` for what the files leave open) reads pictures
+and poses into a `Recording` of `View`s with a `Camera` and a `Target`; `handeye.solve` finds the answer, and
+`plan` which view to take next. `detect` finds a target in one picture. `read_recording`, `write_recording`,
+`read_camera` and `read_target` are for files of ours and others; a `Pose` is a transform, `Mounting` says
+where the camera sits, and everything that goes wrong is a `HandeyeError` with a code and a hint.
+
+The rooms below have more: `handeye.estimation`, `handeye.planning`, `handeye.session` (driving an arm),
+`handeye.export`, `handeye.testing`. On the command line: `handeye --help`; in the browser: `handeye ui`.
+
 What is named here is imported when it is first used, so `import handeye` itself costs nothing.
 """
 

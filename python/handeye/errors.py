@@ -41,6 +41,15 @@ class HandeyeError(Exception):
         A stable lower-case word for scripts, such as `not_rigid`; by default the `default_code` of the class.
     hint
         What to do about it, or None.
+
+    Examples
+    --------
+    >>> import handeye
+    >>> try:
+    ...     handeye.open_folder("no such folder")
+    ... except handeye.HandeyeError as error:
+    ...     print(error.code, int(error.exit_code))
+    missing_file 3
     """
 
     exit_code: ClassVar[ExitCode] = ExitCode.SOLVE

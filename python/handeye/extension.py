@@ -32,13 +32,11 @@ def library(module: str, extra: str) -> Any:  # noqa: ANN401 - a module without 
     try:
         return import_module(module)
     except ImportError as error:
-        absent = (
-            isinstance(error, ModuleNotFoundError)
-            and (error.name or "").partition(".")[0] == (module.partition(".")[0])
-        )
+        package = module.partition(".")[0]
+        absent = isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0] == package
         found = "is not installed" if absent else f"cannot be loaded: {error}"
         raise DeviceError(
-            f"the library {module} {found}",
+            f"the library {package} {found}",
             code="library_missing",
             hint=f"pip install 'handeye[{extra}]'",
         ) from error

@@ -66,3 +66,25 @@ def test_import_copies_and_other_commands_say_what_they_take(
     assert list(data["cameras"]) == ["left", "right", "front", "side"]
     assert read_rig(copy).recording == recording
     assert handeye.fails("solve", folder, "--model", "paper")["code"] == "several_cameras"
+
+
+def test_export_writes_one_of_the_cameras(handeye: Handeye, folder: Path) -> None:
+    handeye("solve", folder, "--output", folder / "answer.json")
+    for given in (folder / "answer.json", folder):
+        data = handeye.json("export", given, "--of", "right", "--format", "ros2")
+        assert data["parent_frame"] == "tool0"
+        assert handeye.fails("export", given, "--format", "ros2")["code"] == "several_cameras"
+        assert handeye.fails("export", given, "--of", "up", "--format", "ros2")["code"] == "several_cameras"
+
+
+def test_plan_ranks_stations_by_what_all_cameras_learn(handeye: Handeye, folder: Path) -> None:
+    data = handeye.json("plan", folder, "--first", "8", "--top", "3")
+    assert len(data["used"]) == 8
+    gains = [candidate["gain"] for candidate in data["candidates"]]
+    assert len(gains) == 3
+    assert gains == sorted(gains, reverse=True)
+    assert min(gains) > 0
+    assert data["candidates"][0]["seen"]
+    assert "teach most" in handeye("plan", folder, "--robot", "ur5e").out
+    assert handeye.fails("plan", folder, "--first", "12")["code"] == "no_candidate"
+    assert handeye.fails("plan", folder, "--together", "3")["exit_code"] == 2

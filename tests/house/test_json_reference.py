@@ -114,6 +114,7 @@ def test_solve_several_cameras(handeye: Handeye, tmp_path: Path) -> None:
         camera.clear()
         camera["target"] = target
     compare("handeye solve, several cameras", data)
+    compare("handeye plan, several cameras", handeye.json("plan", tmp_path / "rig"))
 
 
 def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
@@ -124,6 +125,10 @@ def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
     path.write_text(easy_samples(Mounting.EYE_IN_HAND, wrong=1))
     one_out = handeye.json("solve", path, "--mounting", "eye_in_hand")
     compare("handeye solve, poses alone", answer, one_out)
+
+
+def test_demo_of_a_rig(handeye: Handeye, tmp_path: Path) -> None:
+    compare("handeye demo --rig", handeye.json("demo", "--rig", tmp_path / "rig"))
 
 
 def test_demo_of_a_folder(handeye: Handeye, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,6 +149,10 @@ def test_plan(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     )
 
 
+def test_expect(handeye: Handeye) -> None:
+    compare("handeye expect", handeye.json("expect", "--views", "4", "--cells", "1"))
+
+
 def test_validate(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
     without_truth = made_recording(8)
     object.__setattr__(without_truth, "truth", None)
@@ -160,6 +169,10 @@ def test_export(handeye: Handeye, shipped: Path) -> None:
         handeye.json("export", shipped, "--format", "urdf"),
         handeye.json("export", shipped, "--format", "moveit_samples"),
     )
+
+
+def test_devices(handeye: Handeye) -> None:
+    compare("handeye devices", handeye.json("devices"))
 
 
 def test_target(handeye: Handeye, tmp_path: Path) -> None:
@@ -220,6 +233,7 @@ def test_simulated_studies(handeye: Handeye) -> None:
     scale = handeye.json("study", "scale", "--trials", "40", "--workers", "1", "--no-cluster")
     compare("handeye study scale", scale)
     few = ("--trials", "1", "--workers", "1")
+    compare("handeye study rigs", handeye.json("study", "rigs", "--trials", "1", "--workers", "1"))
     compare("handeye study policies", handeye.json("study", "policies", "--budgets", "5", *few))
     one_step = ("--candidates", "3", "--draws", "2", "--arm", "exact")
     compare("handeye study gains", handeye.json("study", "gains", *one_step, *few))

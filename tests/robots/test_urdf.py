@@ -239,3 +239,11 @@ class TestHostile:
         except HandeyeError:
             return
         assert np.all(np.isfinite(arm.forward(np.zeros(len(arm)))))
+
+
+def test_what_xacro_tells_in_comments_is_no_template() -> None:
+    """It quotes the expressions that it was made from."""
+    plain = two_joints()
+    told = plain.replace(b"<link", b"<!-- limits: ${xacro.load_yaml('limits.yaml')} -->\n<link", 1)
+    assert told != plain
+    assert parse_urdf(told).joint_names == parse_urdf(plain).joint_names

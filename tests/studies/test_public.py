@@ -12,6 +12,7 @@ from handeye import _core
 from handeye.datasets import read_recording
 from handeye.datasets.shipped import shipped_recording
 from handeye.errors import InputError
+from handeye.importing.streams import clock_lag
 from handeye.simulation.cells import ErrorKind, simulate
 from handeye.simulation.mujoco_pictures import MujocoPictures
 from handeye.studies import kinhec, rendered_cell
@@ -73,6 +74,7 @@ class Stream:
     def __init__(self, row: dict[str, Any]) -> None:
         random = np.random.default_rng(row["number"])
         self.eye_in_hand = row["number"] % 2 == 0
+        self.synchronous = True
         self.X, self.Y = _core.se3_exp(random.uniform(-0.5, 0.5, (2, 6)))
         self.flange = _core.se3_exp(random.uniform(-1, 1, (20, 6)) * np.repeat([0.4, 1.2], 3))
         noise = _core.se3_exp(random.normal(size=(20, 6)) * np.repeat([5e-4, 1e-3], 3))
@@ -156,3 +158,18 @@ def test_table_1_is_taken_apart(data_folder: Path) -> None:
     assert set(document["rows"]) == {"printed", "opencv_corners", "our_corners", "default"}
     assert document["factor_of_corners"] > 2
     assert document["factor_of_camera"] > 2
+
+
+def test_the_clock_of_a_sequence_is_found() -> None:
+    random = np.random.default_rng(3)
+    times = np.arange(0, 6, 0.02)
+    phase = random.uniform(0, 6, 6)
+    twists = np.array([0.2 * np.sin((0.5 + 0.3 * np.arange(6)) * t + phase) for t in times])
+    flange = _core.se3_exp(twists * np.repeat([1.0, 3.0], 3))
+    X, Y = _core.se3_exp(random.uniform(-0.5, 0.5, (2, 6)))
+    seen = np.linalg.inv(flange @ X) @ Y
+    seen[40] = np.nan  # not in sight
+    camera = SimpleNamespace(t=times + 0.053, T_cam_target_meas=seen)
+    robot = SimpleNamespace(t=times, T_base_ee_meas=flange)
+    sequence = SimpleNamespace(camera=camera, robot=robot, eye_in_hand=True)
+    assert clock_lag(kinhec.streams_of(sequence)) == pytest.approx(0.053, abs=2e-3)

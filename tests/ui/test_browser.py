@@ -22,6 +22,8 @@ from handeye.session.settings import Configuration
 
 pytestmark = needs_browser
 QUICK = ("--points-only", "0.1")
+# Nothing ends it by itself before a busy machine has pressed a button.
+LONG = ("--accuracy-mm", "0.001", "--max-views", "400")
 SERIOUS = {"serious", "critical"}
 
 
@@ -129,7 +131,7 @@ def test_a_whole_session_by_clicks(opened: Any, tmp_path: Path) -> None:
 def test_stop_ends_the_run_and_pauses(opened: Any, tmp_path: Path) -> None:
     from playwright.sync_api import expect
 
-    with command("run", "--session", tmp_path / "s", *QUICK, "--ui", "--accuracy-mm", "0.01") as (address, _):
+    with command("run", "--session", tmp_path / "s", *QUICK, "--ui", *LONG) as (address, _):
         one = opened(address)
         state(one, "Waiting")
         press(one, "run_on")

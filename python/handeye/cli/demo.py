@@ -37,6 +37,7 @@ def demo(
     *,
     picture: Path = Path("handeye-demo.png"),
     cell: Annotated[Path | None, Parameter(show_default=False)] = None,
+    rig: Annotated[Path | None, Parameter(show_default=False)] = None,
     folder: Annotated[Path | None, Parameter(show_default=False)] = None,
     starts: Annotated[int | None, Parameter(show_default=False)] = None,
     points_only: Annotated[float | None, Parameter(show_default=False)] = None,
@@ -53,6 +54,9 @@ def demo(
     is looked for in them. What was reached is compared with what was promised, and with the truth, which the
     loop does not see.
 
+    With --rig a simulated arm with two cameras on its flange, two beside it and two boards is driven until
+    every camera is as accurate as asked; pixels are projected, not rendered. Broken off, it goes on.
+
     With --folder nothing is shown: a new folder with rendered pictures of a ChArUco board and the poses of a
     simulated robot is written, to try the other commands on.
 
@@ -62,6 +66,8 @@ def demo(
         Where to write the picture (.png, .svg or .pdf).
     cell
         Drive simulated cells; a new folder for the session of the first one, with its report.
+    rig
+        Drive a simulated rig; a folder for its recording.
     folder
         Write a folder of pictures and poses.
     starts
@@ -73,6 +79,10 @@ def demo(
     """
     if folder is not None:
         return _example(folder, seed)
+    if rig is not None:
+        from handeye.cli.demo_rig import drive_rig  # noqa: PLC0415 - the recording needs none of it
+
+        return drive_rig(rig, seed)
     check_picture(picture)
     if cell is not None:
         return _closed_loop(picture, cell, CELLS if starts is None else starts, points_only, seed)

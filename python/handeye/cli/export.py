@@ -16,9 +16,10 @@ from handeye.cli.solve_poses import ONLY_POSES
 from handeye.cli.source import Source
 from handeye.datasets import PosePairs
 from handeye.datasets.writing import replace_file
-from handeye.estimation import solve
+from handeye.errors import InputError
+from handeye.estimation import solve, solve_rig
 from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text, moveit_samples, read_result
-from handeye.importing import PosesSolved, solve_poses
+from handeye.importing import OpenedRig, PosesSolved, is_rig, solve_poses
 from handeye.types import Pose
 from handeye.types.calibration import ModelName
 
@@ -91,6 +92,7 @@ def export(
     output: Path | None = None,
     model: ModelName | None = None,
     reduced: bool = False,
+    of: str | None = None,
     names: Names = Names(),
     source: Source = Source(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
@@ -115,6 +117,8 @@ def export(
         For a folder: auto (the data say how noisy robot and camera are) or paper (both are exact).
     reduced
         For a folder: answer even where the views leave directions open.
+    of
+        The camera to write, where there are several.
     """
     check_output(output)
     is_folder = result.is_dir() or result.suffix.lower() != ".json"
@@ -123,13 +127,13 @@ def export(
             raise UsageError(f"{format.value} needs the views", hint="give the folder instead of the result")
         return _answer(format, moveit_samples(source.open(result).recording), output, (), {})
     if is_folder:
-        answer = _solved(result, source, model or ModelName.AUTO, reduced=reduced)
+        answer = _solved(result, source, model or ModelName.AUTO, of, reduced=reduced)
     elif source != Source() or model is not None or reduced:
         raise UsageError(
             "a result is solved already", hint="leave the options for folders away, or give the folder"
         )
     else:
-        answer = read_result(result)
+        answer = read_result(result, of)
     mount = Mount(answer, names.frames(Frames.usual(answer.mounting)))
     data = {
         "parent_frame": mount.parent,
@@ -139,7 +143,30 @@ def export(
     return _answer(format, checked_text(EXPORTERS[format], mount), output, mount.warnings, data)
 
 
-def _solved(folder: Path, source: Source, model: ModelName, *, reduced: bool) -> Result:
+def _of_rig(opened: OpenedRig, of: str | None, *, reduced: bool) -> Result:
+    names = list(opened.recording.cameras)
+    if of not in names:
+        asked = "" if of is None else f"no camera {of[:60]!r}; "
+        raise InputError(
+            f"{asked}{len(names)} cameras ({', '.join(names)})",
+            code="several_cameras",
+            hint="name one with --of",
+        )
+    rig = solve_rig(opened.recording, reduced=reduced)
+    if rig.targets_of[of] is None:
+        raise InputError(
+            f"camera {of}: saw no target that the arm moves against it, and formats name one",
+            code="not_tied",
+            hint="take its pose from the JSON of handeye solve",
+        )
+    return Result.of(rig.cameras[of], opened.recording.name, [*map(str, opened.warnings), *rig.warnings])
+
+
+def _solved(folder: Path, source: Source, model: ModelName, of: str | None, *, reduced: bool) -> Result:
+    if is_rig(folder):
+        return _of_rig(source.open_rig(folder), of, reduced=reduced)
+    if of is not None:
+        raise UsageError("--of names one of several cameras; there is one", hint="leave it out")
     opened = source.open_any(folder)
     if isinstance(opened, PosePairs):
         return _of_poses(solve_poses(opened))

@@ -16,6 +16,7 @@ from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.page import Page, serve, show_views
+from handeye.cli.plan_rig import plan_rig
 from handeye.cli.plan_together import Together, check_together, choose_together, show_together, together_data
 from handeye.cli.source import Source, mindful_of
 from handeye.cli.work import WorkOptions, check_touch, touch_lines
@@ -25,7 +26,7 @@ from handeye.estimation import Estimate, Measurements, make_estimator
 from handeye.estimation.estimate import answering
 from handeye.estimation.initialize import check_views
 from handeye.estimation.work import Work, touch_where_possible
-from handeye.importing import Opened
+from handeye.importing import Opened, is_rig
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
 from handeye.planning.prediction import Sight
 from handeye.planning.touch import touch_criterion
@@ -145,6 +146,21 @@ def plan(
     if (criterion is Criterion.TOOL_POINT) != (tool_point_mm is not None):
         raise UsageError("--criterion tool_point and --tool-point-mm go together")
     table = None if candidates is None else read_poses(candidates, source.stated())
+    if is_rig(folder):
+        if together is not None or touch_mm is not None or page.ui or model is ModelName.PAPER:
+            raise UsageError("--together, --touch-mm, --ui and --model paper take one camera")
+        rig = source.open_rig(folder)
+        views = [station.views[0].view for station in rig.recording.stations]
+        return plan_rig(
+            rig,
+            table,
+            output,
+            used=used,
+            first=first,
+            top=top,
+            sight=Sight(margin_px=margin_px, fewest=fewest),
+            kinematics=arm.kinematics(views, model),
+        )
     opened = (source if table is None else source.of_a_recording(folder)).open(folder, arm.described())
     measurements = Measurements.of_recording(opened.recording)
     check_views(measurements)

@@ -186,7 +186,7 @@ def run(
         confirm=front.confirm,
         observer=front.observer,
     )
-    if session is None:
+    if dry_run or session is None:
         return _plan(prepared)
     loop, store = begin(prepared, session)
     return run_answer(session, configuration, prepared, _driven(loop, store, prepared, front))

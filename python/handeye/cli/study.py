@@ -45,6 +45,9 @@ study.command(
     help="Measure what a million trials cost here and on a cluster.",
 )
 study.command(
+    "handeye.cli.study_rigs:rigs", name="rigs", help="Count what several cameras at once are worth."
+)
+study.command(
     "handeye.cli.study_methods:methods",
     name="methods",
     help="Compare every method on the same simulated cells.",

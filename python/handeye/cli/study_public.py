@@ -35,7 +35,11 @@ def public(
     *,
     parts: Annotated[tuple[PublicPart, ...], Parameter(consume_multiple=True)] = (PublicPart.SETS,),
     kinhec: Path | None = None,
-    tracks: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("pnp", "robot_error"),
+    tracks: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (
+        "pnp",
+        "robot_error",
+        "temporal",
+    ),
     most: int | None = None,
     folder: Path | None = None,
     data: Data = Data(),  # noqa: B008
@@ -153,6 +157,9 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
                 evidence = f"{one['sequences']} sequences{stated}"
                 heading(console, f"KinHEC {found['version']}, {track}", evidence)
                 _table(console, "solver", one["solvers"], ("answered",))
+                if one["clock_error_ms"] is not None:
+                    ours, theirs = one["clock_error_ms"], one["their_clock_error_ms"]
+                    console.print(f"clock: median error {ours:.2f} ms, KinHEC's own estimate {theirs:.2f} ms")
         else:
             evidence = f"{found['views']} views, difference of disjoint halves"
             heading(console, found["name"], evidence)

@@ -18,7 +18,7 @@ def scale(
     *,
     trials: int = 400,
     workers: Annotated[int | None, Parameter(show_default=False)] = None,
-    cluster: bool = True,
+    no_cluster: Annotated[bool, Parameter(show_default=False)] = False,
     seed: Seed = 0,
     output: Path | None = None,
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
@@ -35,8 +35,8 @@ def scale(
         Number of trials.
     workers
         Processes, and workers of the cluster; all processors by default.
-    cluster
-        Whether the cluster is measured too; it needs the extra `cluster`.
+    no_cluster
+        Leave out the cluster, which needs the extra `cluster`.
     seed
         Seed of the trials.
     output
@@ -46,7 +46,7 @@ def scale(
 
     check_folder(output)
     processes = Trials(workers=workers).processes
-    document = study_scale(trials=trials, processes=processes, cluster=cluster, seed=seed).to_dict()
+    document = study_scale(trials=trials, processes=processes, cluster=not no_cluster, seed=seed).to_dict()
     written = write_results(output, "scale", document, lambda: ())
     return Answer(document, lambda console: _show(console, document, written))
 

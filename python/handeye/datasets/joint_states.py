@@ -51,7 +51,9 @@ def read_joint_rows(path: Path, arm: Forward | None) -> PoseRows | None:
         document = read_document_file(path)
     except InputError:
         return None
-    table = cast("Mapping[str, object]", document) if isinstance(document, Mapping) else {}
+    table: Mapping[str, object] = (
+        cast("Mapping[str, object]", document) if isinstance(document, Mapping) else {}
+    )
     if not set(table) >= _KEYS:
         return None
     if arm is None:

@@ -32,6 +32,14 @@ def read_target(path: str | os.PathLike[str]) -> Target:
     ------
     InputError
         Not such a file; the message names file and field.
+
+    Examples
+    --------
+    >>> import json, pathlib
+    >>> from handeye.types import Chessboard
+    >>> _ = pathlib.Path("board.json").write_text(json.dumps(Chessboard(6, 9, 0.025).to_dict()))
+    >>> read_target("board.json").point_count
+    54
     """
     file = Path(path)
     table = _table(file)

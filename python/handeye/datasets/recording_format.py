@@ -85,6 +85,12 @@ def read_recording(folder: str | os.PathLike[str]) -> LoadedRecording:
         A file that is missing or not what it should be, a newer version, a path that leaves the folder, an
         image of another size than the camera's, or values that make no recording. The message names file,
         view and field.
+
+    Examples
+    --------
+    >>> from handeye.datasets.shipped import shipped_recording
+    >>> read_recording(shipped_recording()).recording.name
+    'CS_synthetic_3'
     """
     root = existing_folder(folder)
     file = root / FILE_NAME
@@ -178,6 +184,14 @@ def write_recording(
     OutputError
         The folder is not empty (without `replace`) or holds no recording (with it), an image is missing, or
         the system refuses to write: no space, no permission, read-only.
+
+    Examples
+    --------
+    >>> import pathlib, handeye
+    >>> from handeye.datasets.shipped import shipped_recording
+    >>> write_recording(handeye.read_recording(shipped_recording()).recording, pathlib.Path("copy"))
+    >>> handeye.read_recording("copy").recording.name
+    'CS_synthetic_3'
     """
     target = Path(folder)
     source = None if images_from is None else Path(images_from)

@@ -65,6 +65,13 @@ def detect(image: Image, target: Target, *, predicted: Prediction | None = None)
     InputError
         Not a grey image of bytes, a family of targets for which there is no detector, or a prediction for
         another number of points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from handeye.types import Chessboard
+    >>> detect(np.full((480, 640), 255, np.uint8), Chessboard(6, 9, 0.025)).reason.value
+    'overexposed'
     """
     kind = next((kind for kind in KINDS if isinstance(target, kind.targets)), None)
     if kind is None:

@@ -76,6 +76,14 @@ def solve(
         leave open, the hint how to cure it.
     SolveError
         No minimum was found.
+
+    Examples
+    --------
+    >>> import handeye
+    >>> from handeye.datasets.shipped import shipped_recording
+    >>> calibration = solve(handeye.open_folder(shipped_recording()).recording)
+    >>> 1e3 * calibration.sigma_translation_m < 0.1  # mm
+    True
     """
     measurements = Measurements.of_recording(recording)
     return calibrate(

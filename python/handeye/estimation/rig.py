@@ -20,6 +20,7 @@ from handeye.estimation.confidence import Within, within
 from handeye.estimation.estimate import Estimate
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.mistakes import Examination, examine
+from handeye.estimation.rig_labels import agree_on_labels
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
 from handeye.estimation.rig_observability import undetermined_rig
 from handeye.types.arrays import FloatArray
@@ -249,6 +250,7 @@ def solve_rig(
     measurements = RigMeasurements.of(recording)
     examinations = examine_rig(measurements)
     measurements = measurements.with_pairs({pair: e.measurements for pair, e in examinations.items()})
+    measurements = agree_on_labels(measurements)
     estimate = estimate_rig(measurements, kinematics, camera_fixed=camera_fixed)
     if not reduced:
         _require_determined(estimate)

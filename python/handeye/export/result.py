@@ -111,16 +111,23 @@ class Result:
         return float(np.sqrt(np.trace(self.covariance[3:, 3:])))
 
 
-def read_result(path: str | os.PathLike[str]) -> Result:
+def read_result(path: str | os.PathLike[str], camera: str | None = None) -> Result:
     """Read the JSON object that a solve printed or wrote.
+
+    Parameters
+    ----------
+    path
+        The file.
+    camera
+        The name of one of several cameras.
 
     Raises
     ------
     InputError
-        Not such a file; the message names file and field.
+        Not such a file; the message names file and field. Or a camera that is not in it.
     """
     file = Path(path)
-    document = read_document(read_result_json(file), _ResultDocument, str(file))
+    document = read_document(_of_camera(read_result_json(file), camera, file), _ResultDocument, str(file))
     camera_name, target_name = document.mounting.result_names
     with located(str(file)):
         poses: list[Pose] = []
@@ -143,6 +150,23 @@ def read_result(path: str | os.PathLike[str]) -> Result:
         )
 
 
+def _of_camera(table: dict[str, Any], camera: str | None, file: Path) -> dict[str, Any]:
+    """Return the answer of one camera, where a solve had several."""
+    cameras = table.get("cameras")
+    if cameras is None and camera is None:
+        return table
+    found = cast("dict[str, Any]", cameras) if isinstance(cameras, dict) else {}
+    chosen = found.get(camera or "")
+    if not isinstance(chosen, dict):
+        asked = "" if camera is None else f"no camera {camera[:60]!r}; "
+        raise InputError(
+            f"{file}: {asked}{len(found)} cameras ({', '.join(map(str, found))[:100]})",
+            code="several_cameras" if found else "invalid_field",
+            hint="name one with --of" if found else "leave --of out: the answer is that of one camera",
+        )
+    return {"recording": table.get("recording", ""), **cast("dict[str, Any]", chosen)}
+
+
 def read_result_json(file: Path) -> dict[str, Any]:
     """Return the JSON object in a file that a solve wrote.
 
@@ -159,7 +183,7 @@ def read_result_json(file: Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise InputError(f"{file}: expected the JSON object that a solve writes", code="invalid_field")
     table = cast("dict[str, Any]", data)
-    if "error" in table and "mounting" not in table:
+    if "error" in table and not {"mounting", "cameras"} & set(table):
         raise InputError(
             f"{file}: no result but an error",
             code="no_result",

@@ -23,11 +23,12 @@ from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.pose_list import stated_target
 from handeye.datasets.pose_pairs import PoseStreams
 from handeye.datasets.pose_rows import NOTHING_STATED
-from handeye.detection import Detection, Image, Reason, calibrate_camera, detect_all
+from handeye.detection import Detection, Image, Reason, detect_all
 from handeye.errors import DetectionError, HandeyeError, InputError, UnstatedError
 from handeye.estimation import Measurements
 from handeye.importing.bag_choice import NOTHING_CHOSEN, BagOptions
 from handeye.importing.bags import Timing, pictures_of
+from handeye.importing.own_camera import calibrated_from_used_views, camera_of_views
 from handeye.importing.readings import compare
 from handeye.importing.streams import pairs_of
 from handeye.importing.unstated import unstated
@@ -74,6 +75,11 @@ class SourceOptions:
         What counts in a bag.
     arm
         The robot, whose joints a bag or a file of poses may have in place of poses.
+
+    Examples
+    --------
+    >>> SourceOptions(poses="poses.csv").poses
+    'poses.csv'
     """
 
     layout: str | None = None
@@ -145,6 +151,12 @@ def open_folder(
         The views do not determine the camera.
     DetectionError
         The target is in none of the images.
+
+    Examples
+    --------
+    >>> from handeye.datasets.shipped import shipped_recording
+    >>> open_folder(shipped_recording()).recording.mounting.value
+    'eye_in_hand'
     """
     opened = open_any(path, options, progress=progress)
     if isinstance(opened, PosePairs):
@@ -219,6 +231,8 @@ def _of_images(images: ImageSet, given: Camera | None, progress: Callable[[int, 
         if (detection := found.get(shot.name)) is not None
     ]
     recording = images.recording(camera, views)
+    if origin is CameraOrigin.CALIBRATED:
+        recording = calibrated_from_used_views(recording)
     # What both the set and the recording made of it look at is said once.
     notes = dict.fromkeys(detection.note for detection in found.values() if detection.note)
     differs = [DataWarning("target_differs", note) for note in notes]
@@ -293,9 +307,7 @@ def _camera(
         if camera is not None:
             _check_size(camera, size, f"the pictures in {images.folder}")
             return camera, origin
-    camera = calibrate_camera(images.target, found, size).camera
-    of_views = Camera(camera.lens, camera.parameters, *camera.size_px, camera.covariance, from_views=True)
-    return of_views, CameraOrigin.CALIBRATED
+    return camera_of_views(images.target, found, size), CameraOrigin.CALIBRATED
 
 
 def _check_size(camera: Camera, size: tuple[int, int], what: str) -> None:

@@ -62,6 +62,17 @@ def pairs_of(streams: PoseStreams) -> PosePairs:
     )
 
 
+def clock_lag(streams: PoseStreams) -> float:
+    """Return how much later the target's poses are stamped than the robot's, in seconds.
+
+    Raises
+    ------
+    InputError
+        Streams that do not overlap.
+    """
+    return _lag(streams.robot, _moments(streams))
+
+
 def _moments(streams: PoseStreams) -> _Moments:
     robot, seen = streams.robot, streams.seen
     inside = np.flatnonzero((seen.times_s >= robot.times_s[0]) & (seen.times_s <= robot.times_s[-1]))

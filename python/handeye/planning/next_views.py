@@ -39,6 +39,16 @@ def plan(
         Fewer than three usable views.
     DegenerateError
         The views do not determine where the target is.
+
+    Examples
+    --------
+    >>> import handeye
+    >>> from handeye.datasets.shipped import shipped_recording
+    >>> recording = handeye.open_folder(shipped_recording()).recording
+    >>> left = [view.T_base_flange for view in recording.views[5:]]
+    >>> ranking = plan(recording.with_views(recording.views[:5]), left)
+    >>> ranking.prospects[0].gain > ranking.prospects[-1].gain > 0
+    True
     """
     measurements = Measurements.of_recording(recording)
     check_views(measurements)

@@ -2,7 +2,7 @@
 
 The robot's error at a station is the same for all of its views, so their information does not add up. Every
 pair of camera and target gives the information of its pixels on the parameters and on that error; summed over
-the pairs, the error is then eliminated, ``I = H_tt - H_tu (H_uu + 1)^-1 H_ut``. As that is dear for many
+the pairs, the error is then eliminated, ``I = H_tt - H_tu (H_uu + 1)^-1 H_ut``. As that is costly for many
 candidates, those are looked at whose gains, each camera for itself, sum up to the most.
 """
 

@@ -74,19 +74,43 @@ class _Sketch:
         order = sorted(self.shapes, key=lambda shape: float(outlook.nearness(shape[0]).mean()))
         for points, draw in order:
             draw(canvas, outlook(points))
+        room = _Room()
         for point, text, style, size, anchor in self.notes:
             x, y = outlook(point[np.newaxis])[0].tolist()
             shift = 5 if anchor == "start" else 0
             # A white rim keeps words readable on lines.
             canvas.text(
                 x + shift,
-                y - 4,
+                room.baseline(x + shift, y - 4, text, size, anchor),
                 text,
                 size,
                 anchor,
                 f'{style} paint-order="stroke" stroke="#fff" stroke-width="3" stroke-linejoin="round"',
             )
         return canvas
+
+
+class _Room:
+    """Where words may stand: no line of them over another."""
+
+    def __init__(self) -> None:
+        self._taken: list[tuple[float, float, float, float]] = []
+
+    def baseline(self, x: float, y: float, text: str, size: float, anchor: str) -> float:
+        """Return the baseline nearest to y on which a text lies over no other, and take it."""
+        # Letters are at most about so wide, on average; a line is as high as its letters and a rim.
+        width, height = 0.62 * size * len(text), 1.15 * size
+        left = x - {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor] * width
+        steps = (sign * 0.5 * k * height for k in range(40) for sign in (1, -1))
+        place = next(y + step for step in steps if not self._covers(left, y + step, width, height))
+        self._taken.append((left, place - height, left + width, place))
+        return place
+
+    def _covers(self, left: float, baseline: float, width: float, height: float) -> bool:
+        return any(
+            left < right and low < left + width and baseline - height < below and above < baseline
+            for low, above, right, below in self._taken
+        )
 
 
 def cell_picture(scene: Scene) -> str:

@@ -101,7 +101,9 @@ def parse_urdf(content: bytes, *, base: str | None = None, tip: str | None = Non
             code="not_urdf",
             hint="give a robot description in URDF",
         )
-    if b"${" in content or any(child.tag.startswith("xacro:") for child in root.children):
+    # What xacro writes tells in comments how it was made.
+    told = re.sub(rb"<!--.*?-->", b"", content, flags=re.DOTALL)
+    if b"${" in told or any(child.tag.startswith("xacro:") for child in root.children):
         raise InputError(
             "a xacro template, not a URDF",
             code="not_urdf",

@@ -18,6 +18,7 @@ from handeye.datasets.rig_format import append_station
 from handeye.errors import DegenerateError, HandeyeError, InputError
 from handeye.estimation import RigEstimate, RigMeasurements, estimate_rig
 from handeye.estimation.rig import check_tied
+from handeye.estimation.rig_labels import agree_on_labels
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Body as ArmBody
 from handeye.planning.prediction import Sight
@@ -212,7 +213,7 @@ def _estimate(recording: RigRecording, world: RigWorld) -> RigEstimate | None:
     """Return what is believed; None while the stations do not say enough of every camera."""
     if not recording.stations:
         return None
-    measurements = RigMeasurements.of(recording)
+    measurements = agree_on_labels(RigMeasurements.of(recording))
     try:
         check_tied(measurements)
         return estimate_rig(measurements, world.kinematics)

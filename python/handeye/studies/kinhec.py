@@ -16,15 +16,26 @@ import numpy as np
 
 from handeye.compute.parallel import Progress
 from handeye.datasets import PosePair, PosePairs
+from handeye.datasets.bags.tracks import Track
+from handeye.datasets.pose_pairs import PoseStreams
 from handeye.errors import InputError
 from handeye.importing.poses_alone import PosesSolved, solve_poses
+from handeye.importing.streams import clock_lag
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
 from handeye.types.pose import inverses
 from handeye.validation import metrics
 
 OURS = "handeye"
-TRACKS = ("pnp", "robot_error")
+TRACKS = ("pnp", "robot_error", "temporal")
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Errors of the offset between the clocks of a sequence: ours, and that of KinHEC's own estimate."""
+
+    ours_ms: float
+    theirs_ms: float
 
 
 @dataclass(frozen=True)
@@ -34,6 +45,7 @@ class Kinhec:
     version: str
     rows: tuple[dict[str, Any], ...]
     regions: dict[str, tuple[bool, ...]]
+    clocks: dict[str, tuple["Clock", ...]]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON, units in the keys."""
@@ -43,10 +55,14 @@ class Kinhec:
     def _track(self, track: str) -> dict[str, Any]:
         rows = [row for row in self.rows if row["track"] == track]
         solvers = dict.fromkeys(row["solver"] for row in rows)
-        held = self.regions.get(track, ())
+        held, clocks = self.regions.get(track, ()), self.clocks.get(track, ())
         return {
             "sequences": len({row["sequence_id"] for row in rows}),
             "region_holds": float(np.mean(held)) if held else None,
+            "clock_error_ms": None if not clocks else float(np.median([one.ours_ms for one in clocks])),
+            "their_clock_error_ms": None
+            if not clocks
+            else float(np.median([one.theirs_ms for one in clocks])),
             "solvers": {name: _summary([row for row in rows if row["solver"] == name]) for name in solvers},
         }
 
@@ -90,6 +106,21 @@ def pose_pairs(mounting: Mounting, flange: FloatArray, seen: FloatArray) -> Pose
         for k, (hand, eye) in enumerate(zip(flange, seen, strict=True))
     )
     return PosePairs("kinhec", "kinhec", mounting, pairs, "KinHEC")
+
+
+def streams_of(sequence: Any) -> PoseStreams:  # noqa: ANN401 - a class of KinHEC's
+    """Return the two streams of a sequence, each with its own clock; frames without the target left out."""
+    camera, robot = sequence.camera, sequence.robot
+    seen = np.isfinite(camera.T_cam_target_meas).all(axis=(1, 2))
+    mounting = Mounting.EYE_IN_HAND if sequence.eye_in_hand else Mounting.EYE_TO_HAND
+    return PoseStreams(
+        "kinhec",
+        "kinhec",
+        "KinHEC",
+        mounting,
+        Track(robot.t, robot.T_base_ee_meas, "robot"),
+        Track(camera.t[seen], camera.T_cam_target_meas[seen], "camera"),
+    )
 
 
 def holds(found: PosesSolved, X_true: Pose) -> bool:
@@ -144,6 +175,7 @@ def study_kinhec(
     benchmark.SOLVERS[OURS] = ours
     rows: list[dict[str, Any]] = []
     regions: dict[str, tuple[bool, ...]] = {}
+    clocks: dict[str, tuple[Clock, ...]] = {}
     try:
         for number, row in enumerate(chosen):
             sequence = io._load_from_row(root, row)  # noqa: SLF001 - its benchmark has no other way in
@@ -154,9 +186,13 @@ def study_kinhec(
             random = np.random.default_rng(number)
             rows += benchmark.evaluate_sequence(sequence, [*solvers, OURS], rng=random)
             track = str(row["track"])
+            if not sequence.synchronous:
+                (own,) = benchmark.evaluate_sequence(sequence, solvers[:1], sync="estimated", rng=random)
+                ours_ms = 1e3 * abs(clock_lag(streams_of(sequence)) - sequence.time_offset)
+                clocks[track] = (*clocks.get(track, ()), Clock(ours_ms, own["time_offset_err_ms"]))
             regions[track] = (*regions.get(track, ()), *ours.held)
             if progress is not None:
                 progress(number + 1, len(chosen))
     finally:
         del benchmark.SOLVERS[OURS]
-    return Kinhec(importlib.metadata.version("kinhec"), tuple(rows), regions)
+    return Kinhec(importlib.metadata.version("kinhec"), tuple(rows), regions, clocks)

@@ -60,6 +60,12 @@ class Camera:
     InputError
         Unknown lens, wrong number of parameters, not finite, a focal length that is not positive, a size
         that is not 1 to 100 000, or a covariance that is not symmetric and positive semidefinite.
+
+    Examples
+    --------
+    >>> camera = Camera("brown_conrady_5", (900, 900, 640, 512, -0.1, 0, 0, 0, 0), 1280, 1024)
+    >>> camera.size_px
+    (1280, 1024)
     """
 
     lens: str

@@ -17,6 +17,11 @@ class Mounting(StrEnum):
     eye in hand   `T_camera_flange`  `T_flange_base`     `T_base_target`
     eye to hand   `T_camera_base`    `T_base_flange`     `T_flange_target`
     ============  =================  ==================  ==================
+
+    Examples
+    --------
+    >>> Mounting("eye_in_hand").result_names
+    ('T_flange_camera', 'T_base_target')
     """
 
     EYE_IN_HAND = "eye_in_hand"

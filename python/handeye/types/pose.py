@@ -37,6 +37,12 @@ class Pose:
     InputError
         Not (4, 4), an entry that is not finite, not rigid (scaled, sheared, mirrored, another last row), or a
         translation of more than 1e9 m.
+
+    Examples
+    --------
+    >>> T = Pose.exp([0.1, 0, 0, 0, 0, 0]) @ Pose.identity()
+    >>> T.translation.tolist()
+    [0.1, 0.0, 0.0]
     """
 
     __slots__ = ("_matrix",)

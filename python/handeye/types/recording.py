@@ -96,6 +96,13 @@ class Recording:
     ------
     InputError
         Two views of one name, a point that the target does not have, or a pixel far outside the image.
+
+    Examples
+    --------
+    >>> from handeye.datasets.shipped import shipped_recording
+    >>> import handeye
+    >>> len(handeye.open_folder(shipped_recording()).recording.views)
+    30
     """
 
     name: str

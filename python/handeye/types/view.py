@@ -103,6 +103,13 @@ class View:
     InputError
         A value of the wrong shape, not finite, a point twice, no point at all, or a path that leaves the
         folder.
+
+    Examples
+    --------
+    >>> import handeye
+    >>> view = View("img_1", handeye.Pose.identity(), [0, 1, 2, 3], [[10, 10], [90, 10], [10, 90], [90, 90]])
+    >>> len(view)
+    4
     """
 
     name: str

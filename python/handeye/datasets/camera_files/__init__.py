@@ -43,6 +43,15 @@ def read_camera(path: str | os.PathLike[str]) -> Camera:
     ------
     InputError
         Not such a file; the message names file and field.
+
+    Examples
+    --------
+    >>> import json, pathlib, handeye
+    >>> from handeye.datasets.shipped import shipped_recording
+    >>> camera = handeye.open_folder(shipped_recording()).recording.camera
+    >>> _ = pathlib.Path("camera.json").write_text(json.dumps(camera.to_dict()))
+    >>> read_camera("camera.json") == camera
+    True
     """
     file = Path(path)
     document = _document(file)

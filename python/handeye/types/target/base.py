@@ -26,6 +26,12 @@ class Target(ABC):
 
     A member of the family is a frozen dataclass with the measures of the board as its fields. What few
     boards have is a keyword-only field; files hold it only where it is not the usual.
+
+    Examples
+    --------
+    >>> from handeye.types import Chessboard
+    >>> Chessboard(6, 9, 0.025).point_count
+    54
     """
 
     family: ClassVar[str]

@@ -34,6 +34,9 @@ const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, expon
 const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.4, lever_m: 1.0 };
 /// Functions that carry less of the variance than this count as each station's own.
 const SMALLEST_FUNCTION: f64 = 0.01;
+/// So do all but the largest: where stations have little in common there are as many functions as stations, and each
+/// says as little as noise of its own.
+const MOST_FUNCTIONS: usize = 6;
 /// Share of the variance that is always each station's own.
 const OWN_SHARE: f64 = 1e-3;
 
@@ -78,7 +81,9 @@ impl Posture {
         let eigen = SymmetricEigen::new(likeness(cell, beliefs.same_everywhere));
         let count = cell.stations.len();
         let least = SMALLEST_FUNCTION * count as f64;
-        let kept: Vec<usize> = (0..count).filter(|i| eigen.eigenvalues[*i] > least.min(0.5)).collect();
+        let mut kept: Vec<usize> = (0..count).filter(|i| eigen.eigenvalues[*i] > least.min(0.5)).collect();
+        kept.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        kept.truncate(MOST_FUNCTIONS);
         let functions = DMatrix::from_fn(count, kept.len(), |k, j| {
             eigen.eigenvectors[(k, kept[j])] * (eigen.eigenvalues[kept[j]] * (1.0 - OWN_SHARE)).sqrt()
         });
