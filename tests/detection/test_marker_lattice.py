@@ -1,0 +1,24 @@
+"""A lattice of markers that says nothing of what lies beside it."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import cv2
+import numpy as np
+import pytest
+
+from handeye.detection import marker_lattice
+
+
+def test_places_beside_markers_that_give_no_map_are_in_no_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenCV returns no homography where the markers lie on one line; a rendered board far away had that."""
+    corners = np.zeros((4, 4, 2)) + np.arange(4)[:, None, None]
+    lattice = SimpleNamespace(
+        reading=SimpleNamespace(corners=corners),
+        places=np.array([[0, 0], [1, 0], [0, 1], [1, 1]]),
+        shape=(2, 2),
+    )
+    monkeypatch.setattr(cv2, "findHomography", lambda *_: (None, None))
+    beside = np.array([[2, 0], [2, 1]])
+    found = marker_lattice._in_picture(beside, cast("Any", lattice), (640, 480))
+    np.testing.assert_array_equal(found, [False, False])
