@@ -26,11 +26,11 @@ from handeye.planning.rig import RigRequest, rig_gains
 from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.types import CameraView, Pose, RigRecording, Station, View
-from handeye.types.arrays import FloatArray
+from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.kinematics import Kinematics
 
 # What every camera sees when the arm stands still: camera, target, point ids (N,), pixels (N, 2).
-Seen = tuple[str, str, FloatArray, FloatArray]
+Seen = tuple[str, str, IndexArray, FloatArray]
 START_SPREAD_RAD = 0.2
 SPREAD_RAD = 0.25
 # Candidates whose straight path is looked at.
