@@ -7,9 +7,10 @@
 
 From views to an answer: `open_folder` (with `SourceOptions` for what the files leave open) reads pictures
 and poses into a `Recording` of `View`s with a `Camera` and a `Target`; `handeye.solve` finds the answer, and
-`plan` which view to take next. `detect` finds a target in one picture. `read_recording`, `write_recording`,
-`read_camera` and `read_target` are for files of ours and others; a `Pose` is a transform, `Mounting` says
-where the camera sits, and everything that goes wrong is a `HandeyeError` with a code and a hint.
+`plan` which view to take next; `open_rig` and `solve_rig` do the same for several cameras and boards at once.
+`detect` finds a target in one picture. `read_recording`, `write_recording`, `read_camera` and `read_target`
+are for files of ours and others; a `Pose` is a transform, `Mounting` says where the camera sits, and
+everything that goes wrong is a `HandeyeError` with a code and a hint.
 
 The rooms below have more: `handeye.estimation`, `handeye.planning`, `handeye.session` (driving an arm),
 `handeye.export`, `handeye.testing`. On the command line: `handeye --help`; in the browser: `handeye ui`.
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from handeye.datasets import read_camera, read_recording, read_target, write_recording
     from handeye.detection import detect
     from handeye.errors import HandeyeError
-    from handeye.estimation import solve
-    from handeye.importing import SourceOptions, open_folder
+    from handeye.estimation import solve, solve_rig
+    from handeye.importing import SourceOptions, open_folder, open_rig
     from handeye.planning import plan
     from handeye.types import Camera, Mounting, Pose, Recording, Target, View
 
@@ -42,11 +43,13 @@ _PLACES = {
     "View": "types",
     "detect": "detection",
     "open_folder": "importing",
+    "open_rig": "importing",
     "plan": "planning",
     "read_camera": "datasets",
     "read_recording": "datasets",
     "read_target": "datasets",
     "solve": "estimation",
+    "solve_rig": "estimation",
     "write_recording": "datasets",
 }
 
@@ -62,11 +65,13 @@ __all__ = [
     "__version__",
     "detect",
     "open_folder",
+    "open_rig",
     "plan",
     "read_camera",
     "read_recording",
     "read_target",
     "solve",
+    "solve_rig",
     "write_recording",
 ]
 

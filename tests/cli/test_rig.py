@@ -71,10 +71,10 @@ def test_import_copies_and_other_commands_say_what_they_take(
 def test_export_writes_one_of_the_cameras(handeye: Handeye, folder: Path) -> None:
     handeye("solve", folder, "--output", folder / "answer.json")
     for given in (folder / "answer.json", folder):
-        data = handeye.json("export", given, "--of", "right", "--format", "ros2")
+        data = handeye.json("export", given, "--only", "right", "--format", "ros2")
         assert data["parent_frame"] == "tool0"
         assert handeye.fails("export", given, "--format", "ros2")["code"] == "several_cameras"
-        assert handeye.fails("export", given, "--of", "up", "--format", "ros2")["code"] == "several_cameras"
+        assert handeye.fails("export", given, "--only", "up", "--format", "ros2")["code"] == "several_cameras"
 
 
 def test_plan_ranks_stations_by_what_all_cameras_learn(handeye: Handeye, folder: Path) -> None:
@@ -88,3 +88,12 @@ def test_plan_ranks_stations_by_what_all_cameras_learn(handeye: Handeye, folder:
     assert "teach most" in handeye("plan", folder, "--robot", "ur5e").out
     assert handeye.fails("plan", folder, "--first", "12")["code"] == "no_candidate"
     assert handeye.fails("plan", folder, "--together", "3")["exit_code"] == 2
+
+
+def test_other_commands_take_one_of_the_cameras(handeye: Handeye, folder: Path) -> None:
+    error = handeye.fails("validate", folder)
+    assert error["code"] == "several_cameras"
+    assert "--only" in error["hint"]
+    alone = handeye.json("solve", folder, "--only", "front")
+    assert "T_base_camera" in alone
+    assert handeye("validate", folder, "--only", "left").code == 0

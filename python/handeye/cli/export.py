@@ -1,7 +1,7 @@
 """`handeye export`: the answer in the formats of others."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,7 +92,6 @@ def export(
     output: Path | None = None,
     model: ModelName | None = None,
     reduced: bool = False,
-    of: str | None = None,
     names: Names = Names(),
     source: Source = Source(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
@@ -117,8 +116,6 @@ def export(
         For a folder: auto (the data say how noisy robot and camera are) or paper (both are exact).
     reduced
         For a folder: answer even where the views leave directions open.
-    of
-        The camera to write, where there are several.
     """
     check_output(output)
     is_folder = result.is_dir() or result.suffix.lower() != ".json"
@@ -127,13 +124,13 @@ def export(
             raise UsageError(f"{format.value} needs the views", hint="give the folder instead of the result")
         return _answer(format, moveit_samples(source.open(result).recording), output, (), {})
     if is_folder:
-        answer = _solved(result, source, model or ModelName.AUTO, of, reduced=reduced)
-    elif source != Source() or model is not None or reduced:
+        answer = _solved(result, source, model or ModelName.AUTO, reduced=reduced)
+    elif replace(source, only=None) != Source() or model is not None or reduced:
         raise UsageError(
             "a result is solved already", hint="leave the options for folders away, or give the folder"
         )
     else:
-        answer = read_result(result, of)
+        answer = read_result(result, source.only)
     mount = Mount(answer, names.frames(Frames.usual(answer.mounting)))
     data = {
         "parent_frame": mount.parent,
@@ -143,30 +140,28 @@ def export(
     return _answer(format, checked_text(EXPORTERS[format], mount), output, mount.warnings, data)
 
 
-def _of_rig(opened: OpenedRig, of: str | None, *, reduced: bool) -> Result:
+def _of_rig(opened: OpenedRig, only: str | None, *, reduced: bool) -> Result:
     names = list(opened.recording.cameras)
-    if of not in names:
-        asked = "" if of is None else f"no camera {of[:60]!r}; "
+    if only not in names:
+        asked = "" if only is None else f"no camera {only[:60]!r}; "
         raise InputError(
             f"{asked}{len(names)} cameras ({', '.join(names)})",
             code="several_cameras",
-            hint="name one with --of",
+            hint="name one with --only",
         )
     rig = solve_rig(opened.recording, reduced=reduced)
-    if rig.targets_of[of] is None:
+    if rig.targets_of[only] is None:
         raise InputError(
-            f"camera {of}: saw no target that the arm moves against it, and formats name one",
+            f"camera {only}: saw no target that the arm moves against it, and formats name one",
             code="not_tied",
             hint="take its pose from the JSON of handeye solve",
         )
-    return Result.of(rig.cameras[of], opened.recording.name, [*map(str, opened.warnings), *rig.warnings])
+    return Result.of(rig.cameras[only], opened.recording.name, [*map(str, opened.warnings), *rig.warnings])
 
 
-def _solved(folder: Path, source: Source, model: ModelName, of: str | None, *, reduced: bool) -> Result:
+def _solved(folder: Path, source: Source, model: ModelName, *, reduced: bool) -> Result:
     if is_rig(folder):
-        return _of_rig(source.open_rig(folder), of, reduced=reduced)
-    if of is not None:
-        raise UsageError("--of names one of several cameras; there is one", hint="leave it out")
+        return _of_rig(source.open_rig(folder), source.only, reduced=reduced)
     opened = source.open_any(folder)
     if isinstance(opened, PosePairs):
         return _of_poses(solve_poses(opened))

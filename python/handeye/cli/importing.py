@@ -43,7 +43,7 @@ def import_folder(
         Copy the images too.
     """
     check_new_folder(destination)
-    if is_rig(folder):
+    if source.only is None and is_rig(folder):
         return _import_rig(source.open_rig(folder), destination, images=images)
     opened = source.open(folder, arm.described())
     if images and all(view.image is None for view in opened.recording.views):

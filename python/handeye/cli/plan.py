@@ -146,7 +146,7 @@ def plan(
     if (criterion is Criterion.TOOL_POINT) != (tool_point_mm is not None):
         raise UsageError("--criterion tool_point and --tool-point-mm go together")
     table = None if candidates is None else read_poses(candidates, source.stated())
-    if is_rig(folder):
+    if source.only is None and is_rig(folder):
         if together is not None or touch_mm is not None or page.ui or model is ModelName.PAPER:
             raise UsageError("--together, --touch-mm, --ui and --model paper take one camera")
         rig = source.open_rig(folder)

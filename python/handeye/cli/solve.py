@@ -69,7 +69,7 @@ def solve(
         Also write the JSON object to this file.
     """
     check_output(output)
-    if is_rig(folder):
+    if source.only is None and is_rig(folder):
         if certify or page.ui:
             raise UsageError("--certify and --ui take one camera", hint="leave them out for several")
         rig = source.open_rig(folder)

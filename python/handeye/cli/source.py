@@ -12,8 +12,18 @@ from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
 from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, read_cameras, read_target
 from handeye.datasets.recording_header import FILE_NAME
-from handeye.errors import HandeyeError
-from handeye.importing import BagOptions, Opened, OpenedRig, SourceOptions, open_any, open_folder, open_rig
+from handeye.errors import HandeyeError, InputError
+from handeye.importing import (
+    BagOptions,
+    Opened,
+    OpenedRig,
+    SourceOptions,
+    is_rig,
+    one_camera,
+    open_any,
+    open_folder,
+    open_rig,
+)
 from handeye.notations import Direction, Unit, notation_of
 from handeye.robots import Arm
 from handeye.types import Chessboard, Mounting, Target
@@ -87,6 +97,7 @@ class Source(Board):
     flange_frame: str | None = None
     """In a bag: frame of the flange in tf."""
     layout: Annotated[str | None, Parameter(help="Layout of the files, where several fit.")] = None
+    only: Annotated[str | None, Parameter(help="Of several cameras, this one alone.")] = None
 
     def options(self, arm: Arm | None = None) -> SourceOptions:
         """Return the options as the library takes them.
@@ -140,6 +151,8 @@ class Source(Board):
         UsageError, InputError, DetectionError
             As `options` and `handeye.importing.open_any`.
         """
+        if is_rig(folder):
+            return self._one_camera(folder)
         options = self.options(arm)
         with progress("Looking for the target in the images") as advance:
             return open_any(folder, options, progress=advance)
@@ -165,9 +178,21 @@ class Source(Board):
         UsageError, InputError, DetectionError
             As `options` and `handeye.importing.open_folder`.
         """
+        if is_rig(folder):
+            return self._one_camera(folder)
         options = self.options(arm)
         with progress("Looking for the target in the images") as advance:
             return open_folder(folder, options, progress=advance)
+
+    def _one_camera(self, folder: Path) -> Opened:
+        opened = self.open_rig(folder)
+        if self.only is None:
+            raise InputError(
+                f"{folder}: several cameras ({', '.join(opened.recording.cameras)}), expected one",
+                code="several_cameras",
+                hint="name one with --only; handeye solve and handeye plan take them together",
+            )
+        return one_camera(opened, self.only)
 
 
 @contextmanager

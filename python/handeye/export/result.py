@@ -162,7 +162,7 @@ def _of_camera(table: dict[str, Any], camera: str | None, file: Path) -> dict[st
         raise InputError(
             f"{file}: {asked}{len(found)} cameras ({', '.join(map(str, found))[:100]})",
             code="several_cameras" if found else "invalid_field",
-            hint="name one with --of" if found else "leave --of out: the answer is that of one camera",
+            hint="name one with --only" if found else "leave --only out: the answer is that of one camera",
         )
     return {"recording": table.get("recording", ""), **cast("dict[str, Any]", chosen)}
 

@@ -5,7 +5,7 @@ from handeye.importing.bags import Timing
 from handeye.importing.lag import Lag
 from handeye.importing.opening import CameraOrigin, Opened, SourceOptions, open_any, open_folder
 from handeye.importing.poses_alone import PosesSolved, solve_poses
-from handeye.importing.rigs import OpenedRig, is_rig, open_rig
+from handeye.importing.rigs import OpenedRig, is_rig, one_camera, open_rig
 
 __all__ = [
     "BagOptions",
@@ -17,6 +17,7 @@ __all__ = [
     "SourceOptions",
     "Timing",
     "is_rig",
+    "one_camera",
     "open_any",
     "open_folder",
     "open_rig",

@@ -17,12 +17,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from handeye.datasets import DataWarning, holds_several, read_rig, rig_warnings
+from handeye.datasets import DataWarning, holds_several, read_rig, recording_warnings, rig_warnings
 from handeye.datasets.image_header import IMAGE_SUFFIXES
 from handeye.datasets.reading import file_names, folder_names, is_file
 from handeye.datasets.recording_header import FILE_NAME
 from handeye.errors import HandeyeError, InputError, UnstatedError
-from handeye.importing.opening import CameraOrigin, SourceOptions, open_folder
+from handeye.importing.opening import CameraOrigin, Opened, SourceOptions, open_folder
 from handeye.types import (
     Body,
     Camera,
@@ -92,6 +92,11 @@ def open_rig(
     ------
     InputError, DegenerateError, DetectionError
         As for `open_folder`; the message names the camera.
+
+    Examples
+    --------
+    >>> rig = open_rig("my_rig")  # doctest: +SKIP
+    >>> sorted(rig.recording.cameras)  # doctest: +SKIP
     """
     folder = Path(path)
     folder = folder.parent if is_file(folder) else folder
@@ -114,6 +119,37 @@ def open_rig(
             warnings=rig_warnings(recording),
         )
     return _of_folders(folder, options, cameras, progress)
+
+
+def one_camera(opened: OpenedRig, name: str) -> Opened:
+    """Return what one camera saw of the target that it saw most, of those that the arm moves against it.
+
+    Raises
+    ------
+    InputError
+        No such camera, or it saw no such target.
+    """
+    recording = opened.recording
+    seen = [
+        recording.pair(camera, target)
+        for camera, target in recording.pairs
+        if camera == name and recording.moves(camera, target)
+    ]
+    if not seen:
+        known = ", ".join(recording.cameras)
+        raise InputError(
+            f"{opened.folder}: camera {name[:60]!r} saw no target that the arm moves; there are {known}",
+            code="several_cameras",
+        )
+    found = replace(max(seen, key=len), name=f"{recording.name} {name}")
+    return Opened(
+        found,
+        opened.folder,
+        opened.layout,
+        opened.camera_origins[name],
+        opened.missed.get(name, {}),
+        warnings=recording_warnings(found),
+    )
 
 
 def _with_cameras(recording: RigRecording, cameras: Mapping[str, Camera] | None) -> RigRecording:
