@@ -80,8 +80,16 @@ def pan_tilt(random: np.random.Generator, cell: Cell, count: int) -> list[Pose]:
     seen = cell.look(0.1, 0.1)
     A = cell.mounting.chain(first)
     cell.Y = A.inverse() @ cell.X.inverse() @ seen
-    turns = [Pose.exp([0, 0, 0, *random.uniform(-0.25, 0.25, 2), 0]) for _ in range(count)]
-    return [first @ turn for turn in turns]
+    poses: list[Pose] = []
+    while len(poses) < count:
+        pan, tilt = random.uniform(-0.4, 0.4, 2)
+        # One after the other: both at once, about axes in a plane, are conjugate to their inverse.
+        pose = first @ Pose.exp([0, 0, 0, 0, pan, 0]) @ Pose.exp([0, 0, 0, tilt, 0, 0])
+        chain = cell.X @ cell.mounting.chain(pose) @ cell.Y
+        pixels, seen = cell.camera.project(chain.act(cell.target.points))
+        if seen.all() and (pixels > 20).all() and (pixels < np.array(cell.camera.size_px) - 20).all():
+            poses.append(pose)
+    return poses
 
 
 def with_pose(view: View, pose: Pose) -> View:

@@ -103,6 +103,8 @@ def main() -> int:
             lines.append(line)
     for lens in (*LENSES, None):
         some = [line for line in lines if lens in (line["lens"], None)]
+        if not some:
+            continue
         met = sum(line["unknown"]["end"] == EndReason.ACCURACY_REACHED.value for line in some)
         kept = sum(true(line["unknown"], px=True) for line in some)
         beside = sum(true(line["calibrated"], px=False) for line in some)

@@ -441,6 +441,8 @@ class PoseMeasurements:
     def covariances(self) -> NDArray[float64]: ...
     def camera_normal(self) -> tuple[NDArray[float64], NDArray[float64]]:
         """Information (n, n) and gradient (n,) of the free parameters, all views together, at 1 px."""
+    @property
+    def sensitivities(self) -> NDArray[float64]: ...
     def shared_error(self, variances_px2: list[float]) -> float:
         """Factor on the variances for errors that neighbouring points share; one where there are none."""
 

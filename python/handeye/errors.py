@@ -27,6 +27,7 @@ class ExitCode(IntEnum):
     SOLVE = 6
     OUTPUT = 7
     DEVICE = 8
+    MOVED = 9
     INTERRUPTED = 130
 
 

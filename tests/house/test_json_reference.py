@@ -249,6 +249,28 @@ def test_simulated_studies(handeye: Handeye) -> None:
     compare("handeye study coverage", data)
 
 
+def test_check_and_diff(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
+    log = tmp_path / "nights.jsonl"
+    compare(
+        "handeye check",
+        handeye.json("check", shipped),
+        handeye("check", shipped, shipped, "--log", log, "--json").data,
+    )
+    compare("handeye diff", handeye.json("diff", shipped, shipped))
+
+
+def test_replay(handeye: Handeye, tmp_path: Path) -> None:
+    compare("handeye replay", handeye.json("replay", written(made_recording(8), tmp_path / "made")))
+
+
+def test_arm(handeye: Handeye, tmp_path: Path) -> None:
+    links_off = simulate(ErrorKind.SMOOTH_KINEMATIC, 2, CellOptions(length_sigma_m=(5e-4, 5e-4)))
+    of_arm = written(links_off, tmp_path / "arm")
+    urdf = tmp_path / "corrected.urdf"
+    compare("handeye arm", handeye.json("arm", of_arm, "--robot", "ur5e", "--output", urdf))
+    assert urdf.stat().st_size > 1000
+
+
 def test_touch(handeye: Handeye) -> None:
     options = ("--cells", "1", "--touches", "3", "--workers", "1")
     compare("handeye study touch", handeye.json("study", "touch", *options))

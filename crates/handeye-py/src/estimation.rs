@@ -188,6 +188,14 @@ impl PoseMeasurements {
         Ok((convert::dynamic_out(py, &information), convert::scalars_out(py, gradient.as_slice().to_vec())))
     }
 
+    /// How each view's pose moves with the free parameters of the camera and, last, the scale of the board (K, 6, c).
+    #[getter]
+    fn sensitivities<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        let columns = self.views.first().map_or(0, |v| v.sensitivity.ncols());
+        let dynamic = |v: &PoseMeasurement| DMatrix::from_column_slice(6, columns, v.sensitivity.as_slice());
+        convert::dynamics_out(py, &self.views.iter().map(dynamic).collect::<Vec<_>>(), 6, columns)
+    }
+
     /// Factor on the pixel variances for errors that neighbouring points share; one where there are none.
     fn shared_error(&self, variances_px2: Vec<f64>) -> f64 {
         let views: Vec<_> = self.views.iter().map(|v| v.slow).zip(variances_px2).collect();

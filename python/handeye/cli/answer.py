@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
+from handeye.errors import ExitCode
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -21,6 +23,8 @@ class Answer:
         Plain values with stable keys, units in the keys; printed as one JSON object with ``--json``.
     show
         Prints the same for a person.
+    exit_code
+        What the process ends with: not every answer is a good one.
     after
         Done once that is printed, such as keeping a page open; None for nothing.
     """
@@ -28,6 +32,7 @@ class Answer:
     data: Mapping[str, Any]
     show: "Callable[[Console], None]"
     after: Callable[[], None] | None = None
+    exit_code: ExitCode = ExitCode.SUCCESS
 
 
 def json_text(data: Mapping[str, Any]) -> str:

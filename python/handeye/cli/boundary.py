@@ -37,7 +37,7 @@ def run(arguments: Sequence[str]) -> int:
         if isinstance(answer, Answer):
             _give(answer, as_json=as_json)
         sys.stdout.flush()
-        return ExitCode.SUCCESS
+        return answer.exit_code if isinstance(answer, Answer) else ExitCode.SUCCESS
     except CycloptsError as error:
         return _fail(_usage(error, options), as_json=as_json, debug=debug)
     except UnstatedError as error:

@@ -1,6 +1,7 @@
 """Every statement of how far off the answer may be: radii with a probability, the ellipsoid behind them."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -82,11 +83,7 @@ def radii(
     means: FloatArray | None = None,
 ) -> FloatArray:
     """(Q,) radii within which vectors of covariances (Q, n, n) lie, about zero or means (Q, n)."""
-    # A fixed sample: the same covariance has the same radius, to a hundredth.
-    random = np.random.default_rng(20)
-    draws = random.standard_normal((_DRAWS, covariances.shape[-1]))
-    if np.isfinite(degrees_of_freedom):
-        draws /= np.sqrt(random.chisquare(degrees_of_freedom, _DRAWS) / degrees_of_freedom)[:, np.newaxis]
+    draws = _drawn(covariances.shape[-1], degrees_of_freedom)
     variances, axes = np.linalg.eigh(covariances)
     deviations = np.sqrt(np.clip(variances, 0, None))
     centres = np.zeros_like(deviations) if means is None else np.einsum("qji,qj->qi", axes, means)
@@ -96,6 +93,17 @@ def radii(
             for deviation, centre in zip(deviations, centres, strict=True)
         ]
     )
+
+
+@lru_cache(maxsize=8)
+def _drawn(size: int, degrees_of_freedom: float) -> FloatArray:
+    """Return a fixed sample (20000, size): the same covariance has the same radius, to a hundredth."""
+    random = np.random.default_rng(20)
+    draws = random.standard_normal((_DRAWS, size))
+    if np.isfinite(degrees_of_freedom):
+        draws /= np.sqrt(random.chisquare(degrees_of_freedom, _DRAWS) / degrees_of_freedom)[:, np.newaxis]
+    draws.setflags(write=False)
+    return draws
 
 
 def position_region(calibration: Calibration, probability: float = PROBABILITY) -> Ellipsoid:

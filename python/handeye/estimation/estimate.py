@@ -1,6 +1,7 @@
 """What is believed after some views: a value that planning and reporting build on."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -137,7 +138,7 @@ class Estimate:
         """Entropy of X and Y alone, in nats: comparable between models with and without camera parameters."""
         return _entropy(self.covariance[:12, :12])
 
-    @property
+    @cached_property
     def within_95(self) -> Within:
         """How far off the answer may be, with 95 % probability."""
         return within(self.hand_eye_covariance, self.degrees_of_freedom)

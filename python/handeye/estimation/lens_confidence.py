@@ -24,9 +24,19 @@ def lens_within_px(estimate: Estimate, probability: float = PROBABILITY) -> floa
     estimate
         What is believed of the camera's free parameters, with the tails of Student's t.
     """
+    return radius(_of_pixels(estimate), estimate.degrees_of_freedom, probability)
+
+
+def lens_deviation_px(estimate: Estimate) -> float:
+    """Return the standard deviation of what `lens_within_px` bounds."""
+    return float(np.sqrt(np.trace(_of_pixels(estimate))))
+
+
+def _of_pixels(estimate: Estimate) -> FloatArray:
+    """(n, n) covariance of a vector whose length is the root mean square over the image."""
     free = estimate.free_camera
     if not free:
-        return 0.0
+        return np.zeros((1, 1))
     covariance = estimate.covariance[12 : 12 + len(free), 12 : 12 + len(free)]
     camera = estimate.camera
     rays = _rays(camera)
@@ -41,7 +51,7 @@ def lens_within_px(estimate: Estimate, probability: float = PROBABILITY) -> floa
     moved = _without_turn(moved, camera, rays)
     # The mean square is a quadratic form of the parameters; its square root is the length of a vector.
     root = np.linalg.cholesky(moved.T @ moved / len(rays) + 1e-18 * np.diag(1 / deviations**2))
-    return radius(root.T @ covariance @ root, estimate.degrees_of_freedom, probability)
+    return root.T @ covariance @ root
 
 
 def lens_difference_px(camera: Camera, other: Camera) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate
-from handeye.estimation.lens_confidence import lens_within_px
+from handeye.estimation.lens_confidence import lens_deviation_px
 from handeye.planning.collisions import Body
 from handeye.planning.prediction import Sight
 from handeye.planning.visibility import obstacles
@@ -91,12 +91,16 @@ class ViewConstraints:
         """The arm."""
         return self.body.arm
 
-    def passing(self, joints: FloatArray) -> tuple[IndexArray, dict[int, str]]:
-        """Return which of postures (N, n) pass, in their order, and for which first reason others do not."""
+    def passing(self, joints: FloatArray, *, body: bool = True) -> tuple[IndexArray, dict[int, str]]:
+        """Return which of postures (N, n) pass, in their order, and for which first reason others do not.
+
+        Without `body` it is left to the caller whether the arm can stand there.
+        """
         left = np.arange(len(joints))
         turned_down: dict[int, str] = {}
         # Each is asked only of what the ones before it let through; the costly ones come last.
-        for reasons in (self._bad_views, self._hidden, self.body.obstacles, self._failed_before):
+        standing = (self.body.obstacles,) if body else ()
+        for reasons in (self._bad_views, self._hidden, *standing, self._failed_before):
             why = reasons(joints[left])
             turned_down |= {
                 int(index): reason for index, reason in zip(left, why, strict=True) if reason is not None
@@ -165,7 +169,7 @@ def _doubt_px(estimate: Estimate, limits: ViewLimits) -> float:
     turn = np.sqrt(np.trace(covariance[3:6, 3:6]))
     focal = float(estimate.camera.parameters[:2].max())
     deviation = focal * (shift / float(np.mean(limits.distance_m)) + turn)
-    lens = lens_within_px(estimate)
+    lens = 2 * lens_deviation_px(estimate)
     doubt = 2 * deviation + (lens if lens > KNOWN_LENS_PX else 0.0)
     return float(min(doubt, 0.2 * min(estimate.camera.size_px)))
 

@@ -139,8 +139,8 @@ class _Scorer:
         self._prediction = Prediction(constraints.estimate, constraints.sight)
 
     def __call__(self, joints: FloatArray) -> FloatArray:
-        """(N,) worth of postures (N, n); NaN for what cannot be taken."""
-        passed, _ = self._constraints.passing(joints)
+        """(N,) worth of postures (N, n) where the arm can stand; NaN for what cannot be taken anyway."""
+        passed, _ = self._constraints.passing(joints, body=False)
         worth = np.full(len(joints), np.nan)
         if len(passed) > 0:
             some = joints[passed]
@@ -149,6 +149,26 @@ class _Scorer:
             weighed = self._policy.worth(gains, self._travel.seconds(some))
             worth[passed] = gains if weighed is None else weighed
         return worth
+
+    def best_of(
+        self, tried: FloatArray, heights: FloatArray, least: FloatArray
+    ) -> tuple[IndexArray, FloatArray]:
+        """Return the best of postures (S, M, n) where the arm can stand (S,), and how high (S,).
+
+        Asked of the best first, and only above the least (S,): most of the others are never looked at.
+        """
+        heights, rows = heights.copy(), np.arange(len(tried))
+        while True:
+            best = heights.argmax(axis=1)
+            found = heights[rows, best]
+            asked = rows[found > least]
+            if len(asked) == 0:
+                return best, found
+            why = self._constraints.body.obstacles(tried[asked, best[asked]])
+            blocked = asked[[reason is not None for reason in why]]
+            if len(blocked) == 0:
+                return best, found
+            heights[blocked, best[blocked]] = -np.inf
 
     def is_free(self, joints: FloatArray) -> NDArray[np.bool_]:
         """(N,) whether the straight paths to postures (N, n) are free."""
@@ -186,12 +206,12 @@ def _climbed(
         heights = np.nan_to_num(
             scorer(tried.reshape(-1, at.shape[1])).reshape(count, settings.steps), nan=-np.inf
         )
-        best = heights.argmax(axis=1)
-        rises = heights[rows, best] > height
+        best, found = scorer.best_of(tried, heights, height)
+        rises = found > height
         rises[rises] = scorer.is_free(tried[rows, best][rises])
         onward = np.where(rises[:, np.newaxis], steps[rows, best], 0.0)
         at = np.where(rises[:, np.newaxis], tried[rows, best], at)
-        height = np.where(rises, heights[rows, best], height)
+        height = np.where(rises, found, height)
         better |= rises
         radius *= np.where(rises, 1.3, 0.6)
     return at, better

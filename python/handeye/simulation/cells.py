@@ -129,6 +129,7 @@ class SimulatedCell:
     Y: Pose
     camera: Camera
     arm: MixedArm | None
+    pixel_sigma_px: float
 
 
 def simulate(kind: ErrorKind, number: int, options: CellOptions | None = None, *, seed: int = 0) -> Recording:
@@ -194,7 +195,7 @@ def simulate_cell(
         Truth(X, Y),
         "simulated",
     )
-    return SimulatedCell(recording, X, Y, true_camera, mixed)
+    return SimulatedCell(recording, X, Y, true_camera, mixed, pixel_sigma)
 
 
 @cache

@@ -1,7 +1,7 @@
 """What a page is told, as plain values: the scene, the candidates, what is known, the last picture."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -163,7 +163,8 @@ def picture_of_view(shown: Shown, name: str) -> dict[str, Any] | None:
         if view.name == name:
             detection = Detection(view.point_ids, view.pixels)
             picture = Picture(-1 - number, name, None, detection, view.T_base_flange)
-            return drawn_over(shown, picture) | {"has_image": view.image is not None}
+            alone = replace(shown, views=(view,))
+            return drawn_over(alone, picture) | {"has_image": view.image is not None}
     return None
 
 

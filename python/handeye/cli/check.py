@@ -1,0 +1,156 @@
+"""`handeye check`: whether camera, board and arm still are where the calibration says."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from handeye.cli.answer import Answer
+from handeye.cli.arm import ArmSource
+from handeye.cli.failures import UsageError
+from handeye.cli.options import Common
+from handeye.cli.output import check_output, check_picture, write_figure, write_json
+from handeye.cli.source import Source
+from handeye.datasets.check_log import LoggedCheck, append_check, change_of, read_check_log
+from handeye.errors import ExitCode
+from handeye.estimation import Estimate, Measurements, make_estimator, require_determined
+from handeye.estimation.faults import examine
+from handeye.estimation.shift import Check, check_views, plan_check
+from handeye.types.calibration import MM_PER_M, ModelName
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+PLANNED = 2
+
+
+def check(
+    calibrated: Path,
+    views: Path | None = None,
+    /,
+    *,
+    plan: int | None = None,
+    log: Path | None = None,
+    picture: Path | None = None,
+    output: Path | None = None,
+    source: Source = Source(),  # noqa: B008 - frozen
+    arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
+    common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
+) -> Answer:
+    """Test with a few views whether camera, board and arm still are where the calibration says.
+
+    The exit code is 9 where something has moved. Without views it says which two poses of the calibration
+    show a shift best: go there again, take pictures of the board as it lies, and give them.
+
+    Parameters
+    ----------
+    calibrated
+        Folder with the views of the calibration.
+    views
+        Folder with new views of the same board through the same camera; two are enough if they are the ones
+        that were planned.
+    plan
+        Without views: how many poses to choose, at least two.
+    log
+        File that the check is added to, one line each; it says since which check something has moved.
+    picture
+        Draw the log: .png, .svg or .pdf.
+    output
+        Also write the JSON object to this file.
+    """
+    check_output(output)
+    check_output(log)
+    if picture is not None:
+        check_picture(picture)
+        if log is None:
+            raise UsageError("--picture draws the log, and --log is missing")
+    if (views is not None and plan is not None) or (plan is not None and plan < PLANNED):
+        raise UsageError("--plan chooses at least two poses for a check, and goes without views")
+    if views is None and log is not None:
+        raise UsageError("--log keeps checks, and no views are given to check with")
+    opened = source.open(calibrated, arm.described())
+    kinematics = arm.kinematics(opened.recording.views, ModelName.AUTO)
+    known = examine(Measurements.of_recording(opened.recording)).measurements
+    estimate = make_estimator(ModelName.AUTO, kinematics)(known)
+    require_determined(estimate)
+    if views is None:
+        answer = _planned(estimate, known, plan or PLANNED, opened.recording.name)
+    else:
+        new = source.open(views, arm.described()).recording
+        measured = Measurements.of(estimate.mounting, estimate.camera, estimate.target, new.views)
+        answer = _checked(check_views(estimate, measured), opened.recording.name, log, picture)
+    if output is not None:
+        write_json(output, answer.data)
+    return answer
+
+
+def _planned(estimate: Estimate, known: Measurements, count: int, name: str) -> Answer:
+    joints = None if estimate.arm is None else known.joints
+    chosen, detectable = plan_check(estimate, known.motions, joints, count)
+    data: dict[str, Any] = {
+        "recording": name,
+        "detectable_mm": MM_PER_M * detectable,
+        "poses": [
+            {
+                "name": known.views[i].name,
+                "T_base_flange": known.views[i].T_base_flange.to_list(),
+                "joints_rad": list(known.views[i].joints_rad or ()) or None,
+            }
+            for i in chosen
+        ],
+    }
+
+    def show(console: "Console") -> None:
+        names = ", ".join(pose["name"] for pose in data["poses"])
+        console.print(
+            f"Take pictures again where {names} were taken: a shift of the camera by "
+            f"{data['detectable_mm']:.2g} mm would be found every second time.",
+            markup=False,
+        )
+
+    return Answer(data, show)
+
+
+def _checked(found: Check, name: str, log: Path | None, picture: Path | None) -> Answer:
+    data: dict[str, Any] = {"recording": name, **found.to_dict(), "log": None}
+    if log is not None:
+        best = max((cause.log_likelihood for cause in found.causes), default=0.0)
+        now = LoggedCheck(
+            datetime.now(UTC).isoformat(timespec="seconds"),
+            found.p_value,
+            found.moved.value,
+            best,
+            found.sentence,
+        )
+        earlier = read_check_log(log)
+        append_check(log, now)
+        checks = [*earlier, now]
+        change = change_of([one.score for one in checks])
+        data["log"] = {
+            "file": str(log),
+            "checks": len(checks),
+            "moved_since": None if change.first is None else checks[change.first].time,
+            "moved_since_check": None if change.first is None else change.first + 1,
+            "score": change.score,
+        }
+        if picture is not None:
+            from handeye.studies.check_picture import check_figure  # noqa: PLC0415 - rarely wanted
+
+            times = [(one.time, one.p_value) for one in checks]
+            write_figure(picture, check_figure(times, change.first))
+
+    def show(console: "Console") -> None:
+        from handeye.cli.wording import heading, notices  # noqa: PLC0415 - JSON need not wait for it
+
+        heading(console, "moved" if found.alarm else "in place", found.sentence)
+        if found.alarm:
+            notices(
+                console,
+                "What may have moved",
+                (f"{cause.words} (p = {cause.p_value:.2g})" for cause in found.causes[:3]),
+            )
+        if data["log"] is not None:
+            since = data["log"]["moved_since"]
+            said = "nothing has moved" if since is None else f"something has moved since {since}"
+            console.print(f"{data['log']['checks']} checks in {log}: {said}", markup=False, soft_wrap=True)
+
+    return Answer(data, show, exit_code=ExitCode.MOVED if found.alarm else ExitCode.SUCCESS)

@@ -1,0 +1,64 @@
+"""Compare what `handeye expect` foretells with what simulated cells reach.
+
+    .venv/bin/python tools/measure_expectation.py --cells 25
+
+Four kinds of cells, so 100 with 25 each, of seeds that the prediction does not use. Prints the mean error
+foretold and reached after 6, 9 and 12 views (mm, deg), and the ratio of the two.
+"""
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+
+from handeye.robots.simulated import ArmErrors
+from handeye.session.settings import Configuration, Simulation
+from handeye.session.simulated import usual_errors
+from handeye.studies.expectation import expect, reached
+from handeye.types import Chessboard, Target
+
+VIEWS = (6, 9, 12)
+
+
+def cell(robot: str = "epson_c4l", pixel_sigma: float = 0.05, arm_errors: float = 1.0) -> Configuration:
+    """Return a kind of cell."""
+    errors = ArmErrors(**{name: arm_errors * value for name, value in vars(usual_errors()).items()})
+    return Configuration(
+        robot, most_views=VIEWS[-1], simulation=Simulation(errors=errors, points_only=pixel_sigma)
+    )
+
+
+KINDS: dict[str, tuple[Configuration, Target | None]] = {
+    "an arm in good order": (cell(), None),
+    "another arm, three times as wrong": (cell("ur5e", arm_errors=3.0), None),
+    "an exact arm, points off by 0.2 px": (cell(pixel_sigma=0.2, arm_errors=0.0), None),
+    "a board of half the size": (cell(), Chessboard(6, 8, 0.01)),
+}
+
+
+def main() -> None:
+    """Print a line for each kind and number of views."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cells", type=int, default=25)
+    parser.add_argument("--foretold-only", action="store_true", help="do not drive the cells to compare with")
+    asked = parser.parse_args()
+    for name, (configuration, target) in KINDS.items():
+        foretold = expect(configuration, VIEWS, target=target)
+        driven = (
+            []
+            if asked.foretold_only
+            else [reached((replace(configuration, seed=seed), target)) for seed in range(asked.cells)]
+        )
+        for views in VIEWS:
+            level = foretold.at(views)
+            line = f"{name}, {views} views: foretold {level.mean_mm:.4f} mm {level.mean_deg:.4f} deg"
+            errors = np.array([errors[views] for errors in driven if views in errors])
+            if len(errors):
+                mm, deg = errors.mean(axis=0)
+                line += f", reached {mm:.4f} mm {deg:.4f} deg by {len(errors)} cells"
+                line += f", ratio {level.mean_mm / mm:.2f} {level.mean_deg / deg:.2f}"
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()
