@@ -1,16 +1,20 @@
 """What other packages bring: members of a family by entry point, and libraries that only one member needs."""
 
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from handeye.errors import DeviceError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 ROBOTS, CAMERAS, POLICIES = "handeye.robots", "handeye.cameras", "handeye.policies"
 
 
-def announced(group: str) -> dict[str, EntryPoint]:
+def announced(group: str) -> "dict[str, EntryPoint]":
     """Return the members that installed packages announce in a group, by name in alphabetical order."""
+    from importlib.metadata import entry_points  # noqa: PLC0415 - only where others are asked for
+
     return {point.name: point for point in sorted(entry_points(group=group), key=lambda point: point.name)}
 
 
