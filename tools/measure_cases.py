@@ -82,7 +82,9 @@ def pan_tilt(random: np.random.Generator, cell: Cell, count: int) -> list[Pose]:
     cell.Y = A.inverse() @ cell.X.inverse() @ seen
     poses: list[Pose] = []
     while len(poses) < count:
-        pose = first @ Pose.exp([0, 0, 0, *random.uniform(-0.3, 0.3, 2), 0])
+        pan, tilt = random.uniform(-0.4, 0.4, 2)
+        # One after the other: both at once, about axes in a plane, are conjugate to their inverse.
+        pose = first @ Pose.exp([0, 0, 0, 0, pan, 0]) @ Pose.exp([0, 0, 0, tilt, 0, 0])
         chain = cell.X @ cell.mounting.chain(pose) @ cell.Y
         pixels, seen = cell.camera.project(chain.act(cell.target.points))
         if seen.all() and (pixels > 20).all() and (pixels < np.array(cell.camera.size_px) - 20).all():

@@ -251,6 +251,10 @@ def test_check_and_diff(handeye: Handeye, shipped: Path, tmp_path: Path) -> None
     compare("handeye diff", handeye.json("diff", shipped, shipped))
 
 
+def test_replay(handeye: Handeye, tmp_path: Path) -> None:
+    compare("handeye replay", handeye.json("replay", written(made_recording(8), tmp_path / "made")))
+
+
 def test_arm(handeye: Handeye, tmp_path: Path) -> None:
     links_off = simulate(ErrorKind.SMOOTH_KINEMATIC, 2, CellOptions(length_sigma_m=(5e-4, 5e-4)))
     of_arm = written(links_off, tmp_path / "arm")

@@ -26,7 +26,7 @@ Write = Callable[..., Path]
 
 @pytest.fixture(scope="module")
 def journey() -> Journey:
-    return Journey(seed=3, stations=6, picture_hz=8, lag_s=0.030)
+    return Journey(seed=3, stations=5, picture_hz=7, lag_s=0.030)
 
 
 def opened(path: Path, journey: Journey, **options: object) -> Opened:

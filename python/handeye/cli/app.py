@@ -10,6 +10,7 @@ COMMANDS = (
     ("expect", "handeye.cli.expect:expect", "Say what accuracy to expect of a cell before it is built."),
     ("plan", "handeye.cli.plan:plan", "Rank the views to take next."),
     ("validate", "handeye.cli.validate:validate", "Test how far a calibration holds."),
+    ("replay", "handeye.cli.replay:replay", "Go through old data: what each view brought."),
     ("check", "handeye.cli.check:check", "Test whether camera, board and arm still are where they were."),
     ("diff", "handeye.cli.diff:diff", "Say how two calibrations of one camera differ."),
     ("arm", "handeye.cli.corrected:corrected", "Write the arm as it is built, as the views have it."),

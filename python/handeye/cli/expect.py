@@ -33,7 +33,7 @@ def expect(
     mounting: Mounting = Mounting.EYE_IN_HAND,
     distance_mm: tuple[float, float] = (250.0, 900.0),
     tilt_deg: float = 45.0,
-    cells: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1000))] = 8,
+    cells: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1000))] = 6,
     workers: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
     board: Board = Board(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary

@@ -92,6 +92,11 @@ def open_rig(
     ------
     InputError, DegenerateError, DetectionError
         As for `open_folder`; the message names the camera.
+
+    Examples
+    --------
+    >>> rig = open_rig("my_rig")  # doctest: +SKIP
+    >>> sorted(rig.recording.cameras)  # doctest: +SKIP
     """
     folder = Path(path)
     folder = folder.parent if is_file(folder) else folder

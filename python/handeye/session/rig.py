@@ -17,7 +17,7 @@ from handeye.datasets.recording_header import FILE_NAME
 from handeye.datasets.rig_format import append_station
 from handeye.errors import DegenerateError, HandeyeError, InputError
 from handeye.estimation import RigEstimate, RigMeasurements, estimate_rig
-from handeye.estimation.rig import check_tied
+from handeye.estimation.rig_checks import check_tied
 from handeye.estimation.rig_labels import agree_on_labels
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Body as ArmBody
@@ -26,12 +26,12 @@ from handeye.planning.rig import RigRequest, rig_gains
 from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.types import CameraView, Pose, RigRecording, Station, View
-from handeye.types.arrays import FloatArray
+from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.kinematics import Kinematics
 
 # What every camera sees when the arm stands still: camera, target, point ids (N,), pixels (N, 2).
-Seen = tuple[str, str, FloatArray, FloatArray]
-START_SPREAD_RAD = 0.2
+Seen = tuple[str, str, IndexArray, FloatArray]
+START_SPREAD_RAD, START_SHRINK = 0.2, 0.85
 SPREAD_RAD = 0.25
 # Candidates whose straight path is looked at.
 MOST_PATHS = 24
@@ -232,7 +232,8 @@ def _goal(
     """Turn a little about the start at first, then go where most is learnt of what is still missing."""
     random = np.random.default_rng([wish.seed, len(recording), failures])
     if estimate is None or not estimate.determined:
-        spread = START_SPREAD_RAD if len(recording) or failures else 0.0
+        # Nearer to the start after each turn that lost the boards.
+        spread = START_SPREAD_RAD * START_SHRINK**failures if len(recording) or failures else 0.0
         drawn = _free(world, world.start_rad + spread * random.standard_normal((40, len(world.start_rad))))
         return _goal_of(world, drawn[0] if len(drawn) else world.start_rad, label)
     known = np.array([station.joints_rad for station in recording.stations])

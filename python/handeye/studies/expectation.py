@@ -32,10 +32,8 @@ from handeye.types.calibration import MM_PER_M
 MEASURED = 12
 # Numbers of views on either side over which the ratio of errors made and stated is averaged.
 _AROUND = 2
-# That ratio before any cell is simulated, and of how many cells it counts as much: few cells say little.
-_USUAL_RATIO, _USUAL_CELLS = 0.85, 8.0
 # Cells that are simulated, and the seed of the first: far from the seeds that people use.
-CELLS, FIRST_SEED = 8, 770_000
+CELLS, FIRST_SEED = 6, 770_000
 _DRAWS = 4000
 
 
@@ -156,9 +154,7 @@ def _made_of_stated(told: Sequence[_Told], number: int) -> FloatArray:
     near = range(number - _AROUND, number + _AROUND + 1)
     pairs = [(one.made[n], one.stated[n][:2]) for one in told for n in near if n in one.made]
     made, stated = np.array(pairs).reshape(-1, 2, 2).swapaxes(0, 1)
-    weight = len(told) / (len(told) + _USUAL_CELLS)
-    found = np.asarray((made / stated).mean(axis=0), dtype=np.float64)
-    return weight * found + (1 - weight) * _USUAL_RATIO
+    return np.asarray((made / stated).mean(axis=0), dtype=np.float64)
 
 
 def _told(job: _Job) -> _Told | None:

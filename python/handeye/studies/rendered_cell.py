@@ -211,6 +211,8 @@ def _start(one: CellCamera, pictures: MujocoPictures, arm: str, number: int, see
     pool = draw_pool(one, random)
     moving = SimulatedArm(robot, ARMS[arm], int(random.integers(2**31)), pool.candidates[0].joints_rad or ())
 
+    empty = Measurements.of(one.mounting, one.camera, one.target)
+
     def measured(candidate: Candidate) -> View | None:
         moving.move_to(Goal(candidate.name, candidate.T_base_flange, candidate.joints_rad))
         seen = (one.X @ one.mounting.chain(moving.hidden_pose) @ one.Y).matrix
@@ -218,13 +220,15 @@ def _start(one: CellCamera, pictures: MujocoPictures, arm: str, number: int, see
         if not isinstance(detection, Detection):
             return None
         reading = moving.read_pose()
-        return View(
+        view = View(
             candidate.name,
             reading.T_base_flange,
             detection.point_ids,
             detection.pixels,
             joints_rad=candidate.joints_rad,
         )
+        # Too few points, or points that are no view of a plane: as if the board had not been found.
+        return view if len(empty.with_views([view])) == 1 else None
 
     views: list[View] = []
     left = pool
@@ -233,8 +237,9 @@ def _start(one: CellCamera, pictures: MujocoPictures, arm: str, number: int, see
         start, left = draw_start(pool, random)
         views = [view for view in map(measured, start) if view is not None]
     estimator = make_estimator(ModelName.AUTO, ArmKinematics(robot), camera_fixed=True)
-    measurements = Measurements.of(one.mounting, one.camera, one.target, views)
-    planner = Planner(measurements, left, estimator, PlannerOptions(sight=Sight(margin_px=MARGIN_PX)))
+    planner = Planner(
+        empty.with_views(views), left, estimator, PlannerOptions(sight=Sight(margin_px=MARGIN_PX))
+    )
     while len(planner.measurements) < VIEWS:
         answer = planner.ask()
         if not isinstance(answer, Proposal):

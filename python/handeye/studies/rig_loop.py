@@ -75,7 +75,7 @@ def rig_cell(
     def look(label: str) -> list[Seen]:
         pictures = rig.pictures(hidden.hidden_pose, chance_of(seed, label))
         return [
-            (camera, target, np.arange(len(pixels)), pixels)
+            (camera, target, np.arange(len(pixels), dtype=np.int64), pixels)
             for camera, target, pixels in pictures
             if camera in used and target in targets
         ]
