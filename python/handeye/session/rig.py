@@ -17,7 +17,7 @@ from handeye.datasets.recording_header import FILE_NAME
 from handeye.datasets.rig_format import append_station
 from handeye.errors import DegenerateError, HandeyeError, InputError
 from handeye.estimation import RigEstimate, RigMeasurements, estimate_rig
-from handeye.estimation.rig import check_tied
+from handeye.estimation.rig_checks import check_tied
 from handeye.estimation.rig_labels import agree_on_labels
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Body as ArmBody
