@@ -22,6 +22,8 @@ HEALTHY_PX = 0.35
 # A camera of their own must bring the residual of the views down to this share; no nine parameters do that to
 # noise.
 WRONG_SHARE = 0.75
+# And the residual of views that fit their own pose.
+SMALL_SHARE = 0.35
 # What a shear leaves of the residual.
 SHEAR_SHARE = 0.5
 # Rows shifted by less than this share of their height are no shear.
@@ -60,7 +62,8 @@ def examine_pictures(measurements: Measurements, *, closely: bool = False) -> tu
         if after < WRONG_SHARE * before:
             return (missing_distortion.finding(before, after),)
         return ()
-    if after < WRONG_SHARE * before:
+    # Small residuals may well be those of circles or of a lens that no model follows.
+    if after < (WRONG_SHARE if before > HEALTHY_PX else SMALL_SHARE) * before:
         raise _other_camera(kind, sentence, found)
     return ()
 
