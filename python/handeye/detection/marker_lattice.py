@@ -175,7 +175,8 @@ def _in_picture(places: IndexArray, lattice: MarkerLattice, image_size: tuple[in
         return np.zeros(len(places), dtype=np.bool_)
     centres = lattice.reading.corners.mean(axis=1)
     found, _ = cv2.findHomography(lattice.places.astype(np.float64), centres, cv2.LMEDS)
-    if found is None:
+    # OpenCV's own stub knows nothing of None.
+    if found is None:  # pyright: ignore[reportUnnecessaryComparison]
         # Markers all on one line, or nearly so, say nothing of what lies beside it.
         return np.zeros(len(places), dtype=np.bool_)
     homography = np.asarray(found, dtype=np.float64)

@@ -73,16 +73,15 @@ class GenicamCamera:
             the next call.
         """
         with self._one_at_a_time:
-            if self._source is None:
-                self._open()
+            source = self._open() if self._source is None else self._source
             try:
-                self._source.start()
+                source.start()
                 try:
-                    with self._source.fetch(timeout=GRAB_S) as buffer:
+                    with source.fetch(timeout=GRAB_S) as buffer:
                         grey = _grey(label, buffer.payload.components[0])
                         stamp = _stamp(buffer)
                 finally:
-                    self._source.stop()
+                    source.stop()
             except DeviceError:
                 raise
             except Exception as error:
@@ -100,7 +99,7 @@ class GenicamCamera:
             self._source.destroy()
             self._source = None
 
-    def _open(self) -> None:
+    def _open(self) -> Any:
         harvester = _harvester(self._producers)
         there = harvester.device_info_list
         fitting = [i for i, info in enumerate(there) if self._name in {"", info.id_, _identity(info)}]
@@ -112,13 +111,15 @@ class GenicamCamera:
                 hint="name one by its serial number, such as genicam:40012345",
             )
         try:
-            self._source = harvester.create(fitting[0])
+            source = harvester.create(fitting[0])
         except Exception as error:
             raise DeviceError(
                 f"camera {self._name}: {type(error).__name__}: {error}",
                 code="no_camera",
                 hint="is another program using it?",
             ) from error
+        self._source = source
+        return source
 
 
 def _producers(given: str) -> list[Path]:
