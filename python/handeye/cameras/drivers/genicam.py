@@ -73,7 +73,13 @@ class GenicamCamera:
             the next call.
         """
         with self._one_at_a_time:
+<<<<<<< HEAD
             source = self._open() if self._source is None else self._source
+=======
+            if self._source is None:
+                self._open()
+            source: Any = self._source
+>>>>>>> main
             try:
                 source.start()
                 try:
