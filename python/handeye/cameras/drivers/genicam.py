@@ -73,13 +73,9 @@ class GenicamCamera:
             the next call.
         """
         with self._one_at_a_time:
-<<<<<<< HEAD
-            source = self._open() if self._source is None else self._source
-=======
             if self._source is None:
                 self._open()
             source: Any = self._source
->>>>>>> main
             try:
                 source.start()
                 try:
@@ -105,7 +101,7 @@ class GenicamCamera:
             self._source.destroy()
             self._source = None
 
-    def _open(self) -> Any:
+    def _open(self) -> None:
         harvester = _harvester(self._producers)
         there = harvester.device_info_list
         fitting = [i for i, info in enumerate(there) if self._name in {"", info.id_, _identity(info)}]
@@ -117,15 +113,13 @@ class GenicamCamera:
                 hint="name one by its serial number, such as genicam:40012345",
             )
         try:
-            source = harvester.create(fitting[0])
+            self._source = harvester.create(fitting[0])
         except Exception as error:
             raise DeviceError(
                 f"camera {self._name}: {type(error).__name__}: {error}",
                 code="no_camera",
                 hint="is another program using it?",
             ) from error
-        self._source = source
-        return source
 
 
 def _producers(given: str) -> list[Path]:
