@@ -75,14 +75,15 @@ class GenicamCamera:
         with self._one_at_a_time:
             if self._source is None:
                 self._open()
+            source: Any = self._source
             try:
-                self._source.start()
+                source.start()
                 try:
-                    with self._source.fetch(timeout=GRAB_S) as buffer:
+                    with source.fetch(timeout=GRAB_S) as buffer:
                         grey = _grey(label, buffer.payload.components[0])
                         stamp = _stamp(buffer)
                 finally:
-                    self._source.stop()
+                    source.stop()
             except DeviceError:
                 raise
             except Exception as error:

@@ -150,15 +150,17 @@ class FrankaRobot:
     def _settled(self, arm: Any) -> None:  # noqa: ANN401 - a robot of franky
         """Wait until the arm rests: the motion of the controller ends before that of the arm."""
         end = time.monotonic() + SETTLE_S
-        since, reference = time.monotonic(), np.full(JOINTS, np.inf)
+        since_s, reference = 0.0, np.full(JOINTS, np.inf)
         while time.monotonic() < end:
             try:
-                joints = np.asarray(arm.state.q)
+                state = arm.state
+                # By the clock of the controller: an old state that comes again is no rest.
+                joints, now_s = np.asarray(state.q), state.time.to_sec()
             except self._franky.Exception as error:
                 raise self._described("reading", error) from error
             if np.abs(joints - reference).max() > REST_RAD:
-                since, reference = time.monotonic(), joints
-            elif time.monotonic() - since > REST_S:
+                since_s, reference = now_s, joints
+            elif now_s - since_s > REST_S:
                 return
             time.sleep(POLL_S)
         raise DeviceError("the arm does not come to rest", code="not_at_rest")
