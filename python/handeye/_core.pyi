@@ -273,36 +273,44 @@ class Solution:
     @property
     def is_converged(self) -> bool: ...
 
-class ViewSets:
-    """Views linearised at X and Y, to be weighed in sets under levels of the robot's noise.
+class Agreement:
+    """Views of one target through one camera, linearised at X and Y (4, 4), to be fitted in sets.
 
-    The twist between chain and image of view k is ``deviations[k] = noise - rows[k] theta``; its noise is
-    that of the image, `covariances[k]`, and that of the robot, which acts through `from_left[k]` or
-    `from_right[k]`. `prior` (n, n) and `prior_right` (n,): information on theta without the views, and its
-    right side.
+    `stations` are `T_base_flange` (N, 4, 4); at each the image `images[n]` of `seen` was taken, read as
+    `poses[n]` (N, 4, 4). `variances_px2` and `camera` as in `estimate_cell`.
     """
 
     def __init__(
         self,
-        deviations: ArrayLike,
-        rows: ArrayLike,
-        covariances: ArrayLike,
-        from_left: ArrayLike,
-        from_right: ArrayLike,
-        prior: ArrayLike,
-        prior_right: ArrayLike,
+        stations: ArrayLike,
+        images: Sequence[int] | NDArray[int64],
+        poses: ArrayLike,
+        seen: PoseMeasurements,
+        variances_px2: Sequence[float],
+        camera: tuple[bool, int, bool, tuple[ArrayLike, ArrayLike, bool] | None],
+        x: ArrayLike,
+        y: ArrayLike,
     ) -> None: ...
     def fit(
-        self,
-        left: NDArray[bool_],
-        translation_m: ArrayLike,
-        rotation_rad: ArrayLike,
-        members: Sequence[int] | NDArray[int64],
-    ) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64]]:
-        """Covariances (H, n, n) and means (H, n) of theta and log-likelihoods (H,) of a set of views.
+        self, members: Sequence[int] | NDArray[int64], levels: Sequence[float] | None, pairs: int
+    ) -> tuple[
+        float,
+        list[tuple[str, float]],
+        list[float],
+        NDArray[float64],
+        NDArray[float64],
+        NDArray[float64],
+        NDArray[float64],
+        list[float],
+        list[float],
+    ]:
+        """Logarithm of the evidence of a set, levels, constants, X, Y, and what is expected of every view.
 
-        A level h of the noise acts on the `left` of the motion or on the right, with standard deviations
-        per axis.
+        The search for the levels begins at `levels`, if given. Constants are the free parameters of the
+        camera and the scale of the board, relative to what was given. What is expected of a member is what
+        the other members say: twists (N, 6), their covariances (N, 6, 6), the logarithms of their densities
+        (N,) and probabilities of twists at least as unusual (N,). Raises SolveError where the model is
+        singular.
         """
 
 # Information
@@ -431,6 +439,8 @@ class PoseMeasurements:
     def variances_px2(self) -> list[float]: ...
     @property
     def covariances(self) -> NDArray[float64]: ...
+    def camera_normal(self) -> tuple[NDArray[float64], NDArray[float64]]:
+        """Information (n, n) and gradient (n,) of the free parameters, all views together, at 1 px."""
     @property
     def sensitivities(self) -> NDArray[float64]: ...
     def shared_error(self, variances_px2: list[float]) -> float:

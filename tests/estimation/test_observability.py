@@ -6,7 +6,7 @@ import pytest
 from cells import Cell
 from handeye.errors import DegenerateError
 from handeye.estimation import Measurements, calibrate, calibrate_examined
-from handeye.estimation.mistakes import Examination
+from handeye.estimation.faults import Examination
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName

@@ -8,18 +8,20 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 import pytest
 
 from bags_written import Journey, write
 from commands import Handeye
 from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
-from handeye.datasets import write_rig
+from handeye.datasets import write_recording, write_rig
 from handeye.datasets.shipped import shipped_recording
 from handeye.datasets.toml_text import toml_text
 from handeye.simulation import example_folder
 from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.simulation.rigs import simulate_rig
+from handeye.studies.planted import Mistake, made_up, plant
 from handeye.types import Charuco, Mounting
 from scenes import scene
 
@@ -215,6 +217,12 @@ def test_studies(handeye: Handeye, study: str) -> None:
     arguments = ("--data", shipped_recording().parent, "--sets", shipped_recording().name)
     options = ("--trials", "1", "--workers", "1")
     compare(f"handeye study {study}", handeye.json("study", study, *arguments, *options))
+
+
+def test_doctor(handeye: Handeye, tmp_path: Path) -> None:
+    recording, _ = plant(made_up(0, 3), Mistake.GROSS_POSE, np.random.default_rng(0))
+    write_recording(recording, tmp_path / "made")
+    compare("handeye doctor", handeye.json("doctor", tmp_path / "made"))
 
 
 def test_mistakes(handeye: Handeye) -> None:

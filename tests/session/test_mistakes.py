@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from handeye.errors import DeviceError
-from handeye.estimation.mistakes import CODES
+from handeye.estimation.faults import CODES
 from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import EndReason

@@ -93,7 +93,7 @@ fn weights_of(
 /// Views of one target through one camera, each as a pose with its covariance.
 #[pyclass(frozen, module = "handeye._core")]
 pub struct PoseMeasurements {
-    views: Vec<PoseMeasurement>,
+    pub views: Vec<PoseMeasurement>,
 }
 
 #[pymethods]
@@ -176,6 +176,18 @@ impl PoseMeasurements {
         convert::matrices_out(py, &self.views.iter().map(|v| v.covariance).collect::<Vec<_>>())
     }
 
+    /// What all views say of the camera that their poses do not absorb, at 1 px: information and gradient.
+    fn camera_normal<'py>(&self, py: Python<'py>) -> PyResult<(Floats<'py>, Floats<'py>)> {
+        let Some(first) = self.views.first() else { return Err(invalid(py, "no views")) };
+        let mut information = first.camera_information.clone();
+        let mut gradient = first.camera_gradient.clone();
+        for view in &self.views[1..] {
+            information += &view.camera_information;
+            gradient += &view.camera_gradient;
+        }
+        Ok((convert::dynamic_out(py, &information), convert::scalars_out(py, gradient.as_slice().to_vec())))
+    }
+
     /// How each view's pose moves with the free parameters of the camera and, last, the scale of the board (K, 6, c).
     #[getter]
     fn sensitivities<'py>(&self, py: Python<'py>) -> Floats<'py> {
@@ -198,13 +210,30 @@ impl PoseMeasurements {
 }
 
 /// Whether it is on the flange, number of free parameters, whether the prior comes from these pixels, and the prior: information, mean, whether it is inflated.
-type CameraGiven<'py> = (bool, usize, bool, Option<(Array<'py>, Array<'py>, bool)>);
+pub type CameraGiven<'py> = (bool, usize, bool, Option<(Array<'py>, Array<'py>, bool)>);
 /// Jacobians of joints and links per station, scales and free joints, and which ways of displacing are in metres.
 type ArmGiven<'py> = (Array<'py>, Array<'py>, Vec<f64>, Vec<usize>, Vec<bool>);
 /// Camera, target, measurements, and for each of these its station and pixel variance.
 type SeenGiven<'py> = (usize, usize, Bound<'py, PoseMeasurements>, Vec<usize>, Vec<f64>);
 
-fn body(on_flange: bool) -> Body {
+/// A camera from what was given of it.
+pub fn seen_by(
+    py: Python<'_>,
+    (on_flange, parameters, from_these_pixels, prior): CameraGiven<'_>,
+) -> PyResult<SeenBy> {
+    let prior = prior
+        .map(|(information, mean, inflated)| {
+            Ok::<_, PyErr>(CameraPrior {
+                information: square(py, "camera prior", &information)?,
+                mean: DVector::from_vec(convert::scalars(py, "camera mean", &mean)?),
+                inflated,
+            })
+        })
+        .transpose()?;
+    Ok(SeenBy { body: body(on_flange), parameters, from_these_pixels, prior })
+}
+
+pub fn body(on_flange: bool) -> Body {
     if on_flange { Body::Flange } else { Body::Base }
 }
 
@@ -256,21 +285,7 @@ fn estimate_cell<'py>(
             links: of_arm.as_ref().map(|(_, links)| links[k].clone()),
         })
         .collect();
-    let cameras = cameras
-        .into_iter()
-        .map(|(on_flange, parameters, from_these_pixels, prior)| {
-            let prior = prior
-                .map(|(information, mean, inflated)| {
-                    Ok::<_, PyErr>(CameraPrior {
-                        information: square(py, "camera prior", &information)?,
-                        mean: DVector::from_vec(convert::scalars(py, "camera mean", &mean)?),
-                        inflated,
-                    })
-                })
-                .transpose()?;
-            Ok(SeenBy { body: body(on_flange), parameters, from_these_pixels, prior })
-        })
-        .collect::<PyResult<Vec<_>>>()?;
+    let cameras = cameras.into_iter().map(|camera| seen_by(py, camera)).collect::<PyResult<Vec<_>>>()?;
     let mut measurements = Vec::new();
     for (camera, target, views, at, variances) in &seen {
         let views = &views.get().views;

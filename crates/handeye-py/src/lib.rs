@@ -6,6 +6,7 @@
 
 use pyo3::prelude::*;
 
+mod agreement;
 mod alignment;
 mod call;
 mod camera;
@@ -21,10 +22,10 @@ mod model;
 mod planar_pose;
 mod planning;
 mod problem;
-mod view_sets;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    agreement::register(module)?;
     alignment::register(module)?;
     camera::register(module)?;
     closed_form::register(module)?;
@@ -35,7 +36,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     planar_pose::register(module)?;
     planning::register(module)?;
     problem::register(module)?;
-    view_sets::register(module)?;
     model::register(module)?;
     information::register(module)?;
     Ok(())

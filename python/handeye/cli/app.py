@@ -6,6 +6,7 @@ from cyclopts import App, Parameter
 COMMANDS = (
     ("run", "handeye.cli.run:run", "Drive the arm from view to view until the answer is good enough."),
     ("solve", "handeye.cli.solve:solve", "Calibrate from a folder of views."),
+    ("doctor", "handeye.cli.doctor:doctor", "Say what is wrong with a folder of views, and repair a copy."),
     ("ui", "handeye.cli.ui:ui", "Open the page in the browser, on a folder or a simulated cell."),
     ("expect", "handeye.cli.expect:expect", "Say what accuracy to expect of a cell before it is built."),
     ("plan", "handeye.cli.plan:plan", "Rank the views to take next."),

@@ -13,7 +13,7 @@ from handeye.cli.source import Source
 from handeye.datasets.check_log import LoggedCheck, append_check, change_of, read_check_log
 from handeye.errors import ExitCode
 from handeye.estimation import Estimate, Measurements, make_estimator, require_determined
-from handeye.estimation.mistakes import examine
+from handeye.estimation.faults import examine
 from handeye.estimation.shift import Check, check_views, plan_check
 from handeye.types.calibration import MM_PER_M, ModelName
 

@@ -10,7 +10,7 @@ from handeye.cli.output import check_output, write_json
 from handeye.cli.progress import progress
 from handeye.cli.source import Source
 from handeye.estimation import Measurements, make_estimator
-from handeye.estimation.mistakes import examine
+from handeye.estimation.faults import examine
 from handeye.planning.hindsight import hindsight
 from handeye.types.calibration import ModelName
 

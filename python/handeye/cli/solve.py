@@ -21,7 +21,7 @@ from handeye.estimation import Measurements, make_estimator
 from handeye.estimation import solve as solve_recording
 from handeye.estimation.certificate import Certificate, certify_calibration
 from handeye.estimation.confidence import Ellipsoid, position_region, within
-from handeye.estimation.mistakes import examine
+from handeye.estimation.faults import examine
 from handeye.importing import Opened, is_rig
 from handeye.robots import ArmKinematics
 from handeye.types.calibration import Calibration, JointOffset, ModelName, RobotSide

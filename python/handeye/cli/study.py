@@ -409,18 +409,22 @@ def coverage(
 def mistakes(
     *,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = (),
+    data: Data = Data(),
     trials: Trials = Trials(),
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
-    """Plant one mistake each in simulated recordings, and count how many are named, and what they cost.
+    """Plant one mistake each in recordings, and count how many are named, and what they cost.
 
-    A mistake is named if it is all that is said, with exactly the views that it concerns. As many recordings
-    without a mistake count the false alarms.
+    A mistake is named if the first finding says so, with exactly the views that it concerns. As many
+    recordings without a mistake count the false alarms. Recordings are simulated, and random views of the
+    sets that are named.
 
     Parameters
     ----------
     kinds
-        Mistakes to plant, if not all: flip, swap, shift, moving, gross_pose, wrong_unit, wrong_direction.
+        Mistakes to plant, if not all: flip, swap, shift, moving, gross_pose, wrong_unit, wrong_direction,
+        wrong_rotation, mirrored, board_size, camera_size, cropped, stretched, distortion, sheared, stale,
+        repeated, false_points, few_rotations.
     """
     from handeye.studies import Mistake, study_mistakes  # noqa: PLC0415
 
@@ -431,8 +435,10 @@ def mistakes(
             f"no mistake {unknown[0]!r}", code="unknown_kind", hint=f"there are {', '.join(known)}"
         )
     check_folder(trials.output)
-    with progress("Calibrating simulated cells") as advance:
+    sets = data.load((), trials.processes) if data.sets else []
+    with progress("Planting mistakes") as advance:
         result = study_mistakes(
+            sets,
             kinds=[Mistake(kind) for kind in kinds or known],
             model=trials.model,
             trials=trials.count(50),
@@ -446,7 +452,7 @@ def mistakes(
     def show(console: "Console") -> None:
         from handeye.cli import study_tables as tables  # noqa: PLC0415 - JSON need not wait for it
 
-        tables.show_title(console, "One mistake in each simulated recording", document)
+        tables.show_title(console, "One mistake in each recording", document)
         tables.show_mistakes(console, document)
         tables.show_written(console, written)
 

@@ -102,19 +102,18 @@ def show_kinds(console: Console, kinds: Mapping[str, Mapping[str, Any]]) -> None
 
 
 def show_mistakes(console: Console, document: Mapping[str, Any]) -> None:
-    """Print how many of each mistake were named, and the error against that without the mistake."""
+    """Print how many of each mistake were named and repaired, and the wrong answers."""
     table = plain_table("mistake")
-    for title in ("named", "answered", "error (mm)", "without it", "trials"):
+    for title in ("named", "answered", "wrong answers", "repaired", "trials"):
         table.add_column(title, justify="right")
     for kind, found in [*document["kinds"].items(), ("all", document["planted"])]:
+        repaired = found["repaired"]
         table.add_row(
             kind.replace("_", " "),
             f"{100 * found['named']:.1f} %",
             f"{100 * found['answered']:.1f} %",
-            *(
-                "-" if found[key] is None else f"{found[key]:.3f}"
-                for key in ("translation_mm", "clean_translation_mm")
-            ),
+            str(found["wrong_answers"]),
+            "-" if repaired is None else f"{100 * repaired:.1f} %",
             str(found["trials"]),
         )
     console.print(table)

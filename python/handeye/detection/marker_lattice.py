@@ -175,10 +175,10 @@ def _in_picture(places: IndexArray, lattice: MarkerLattice, image_size: tuple[in
         return np.zeros(len(places), dtype=np.bool_)
     centres = lattice.reading.corners.mean(axis=1)
     found, _ = cv2.findHomography(lattice.places.astype(np.float64), centres, cv2.LMEDS)
-    if found is None:
-        # Markers all on one line, or nearly so, say nothing of what lies beside it.
-        return np.zeros(len(places), dtype=np.bool_)
     homography = np.asarray(found, dtype=np.float64)
+    if homography.shape != (3, 3):
+        # None found: markers nearly on one line say nothing of what lies beside it.
+        return np.zeros(len(places), dtype=np.bool_)
     around = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * ROOM
     where = mapped(homography, (places[:, np.newaxis] + around).astype(np.float64))
     return np.asarray(((where >= 0) & (where <= image_size)).all(axis=(1, 2)), dtype=np.bool_)

@@ -7,9 +7,9 @@ import numpy as np
 from handeye.errors import DegenerateError
 from handeye.estimation.auto import AutoEstimator, AutoOptions
 from handeye.estimation.estimate import Estimate, Estimator, regular_information
+from handeye.estimation.faults import Examination, examine
 from handeye.estimation.initialize import check_views
 from handeye.estimation.measurements import Measurements
-from handeye.estimation.mistakes import Examination, examine
 from handeye.estimation.paper import paper_estimate
 from handeye.estimation.work import Work, touch_where_possible
 from handeye.types.arrays import FloatArray

@@ -18,8 +18,8 @@ from handeye.estimation.calibrate import require_determined, to_calibration
 from handeye.estimation.cell_fit import CellFit, fit_cell
 from handeye.estimation.confidence import Within, within
 from handeye.estimation.estimate import Estimate
+from handeye.estimation.faults import Examination
 from handeye.estimation.measurements import Measurements
-from handeye.estimation.mistakes import Examination
 from handeye.estimation.rig_checks import check_tied, examine_rig
 from handeye.estimation.rig_labels import agree_on_labels
 from handeye.estimation.rig_measurements import Pair, RigMeasurements

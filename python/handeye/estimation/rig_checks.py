@@ -1,7 +1,7 @@
 """What is asked of a rig before it is estimated: whether all is tied to the arm, and mistakes in views."""
 
 from handeye.errors import HandeyeError, InputError
-from handeye.estimation.mistakes import Examination, examine
+from handeye.estimation.faults import Examination, examine
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
 from handeye.types.rig import Body
 

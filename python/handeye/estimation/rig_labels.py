@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from handeye.estimation.faults.relabel import Relabeling, turns
 from handeye.estimation.initialize import MIN_VIEWS, pose_start
 from handeye.estimation.measurements import Measurements
-from handeye.estimation.mistakes.relabel import Relabeling, turns
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
 from handeye.types.pose import Pose
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from handeye.detection import Detection, calibrate_camera
 from handeye.errors import HandeyeError
 from handeye.estimation import Measurements
-from handeye.estimation.mistakes import examine
+from handeye.estimation.faults import examine
 from handeye.types import Camera, Recording, Target, View
 
 # Through a better camera other views may stand out; that comes to rest soon.

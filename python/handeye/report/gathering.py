@@ -9,7 +9,7 @@ import numpy as np
 
 from handeye.estimation import Measurements, calibrate_examined
 from handeye.estimation.estimate import corrected
-from handeye.estimation.mistakes import examine
+from handeye.estimation.faults import examine
 from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text
 from handeye.export.result import read_result, read_result_json
 from handeye.importing import Opened

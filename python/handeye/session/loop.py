@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
 from handeye.estimation.confidence import Within
+from handeye.estimation.faults import Examination, examine
 from handeye.estimation.lens_confidence import lens_within_px
-from handeye.estimation.mistakes import Examination, examine
 from handeye.session.attempt import Cell
 from handeye.session.contract import check_at_rest
 from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step

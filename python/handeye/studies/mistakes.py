@@ -1,87 +1,49 @@
-"""Are mistakes found and named? Simulated recordings with one planted mistake each, and clean ones.
+"""Are mistakes found and named, and does a repair bring back the answer? One planted mistake each, and none.
 
-A mistake is named correctly if it is the only one that is named, with its code and, where it concerns single
-views, exactly these views. What it costs is the error of the hand-eye against that of the same recording
-without the mistake, both by the same solve.
+A mistake is named right if the first finding has its code and, where it concerns single views, exactly these
+views. An answer is wrong if the region stated at 95 % misses the truth, though that of the same recording
+without the mistake holds it. A repair brings the answer back if it moves the camera's centre by less than the
+stated radius of the clean answer. The truth of a set without any is the answer of all its views.
 """
 
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
 from handeye.compute.parallel import Progress, Workers, run_all
-from handeye.errors import InputError
+from handeye.errors import HandeyeError
 from handeye.estimation import solve
-from handeye.estimation.mistakes import CODES
-from handeye.estimation.mistakes.relabel import reflections, turns
-from handeye.simulation.cells import TARGET, CellOptions, ErrorKind, simulate
-from handeye.studies.protocol import true_hand_eye
-from handeye.types import Chessboard, CircleGrid, Mounting, Pose, Recording, Target, View
-from handeye.types.arrays import FloatArray
-from handeye.types.calibration import ModelName
+from handeye.estimation.confidence import within
+from handeye.estimation.faults import CODES, diagnose
+from handeye.studies.planted import EXPECTED, Mistake, can_be_planted, made_up, plant
+from handeye.types import Pose, Recording
+from handeye.types.calibration import Calibration, ModelName
 from handeye.validation import metrics
 
-RUNS_PER_PIECE = 6
-MM_PER_M = 1000.0
-
-
-class Mistake(StrEnum):
-    """What is planted."""
-
-    FLIP = "flip"
-    """The board of one view labelled turned, or mirrored."""
-    SWAP = "swap"
-    """The images of two views swapped."""
-    SHIFT = "shift"
-    """The list of images shifted by one, all of it or a few in a row."""
-    MOVING = "moving"
-    """One view off by what the arm moves meanwhile, in any direction or towards the next view."""
-    GROSS_POSE = "gross_pose"
-    """One robot pose far off."""
-    WRONG_UNIT = "wrong_unit"
-    """Robot translations or measures of the target in another unit, or rotations in radians for degrees."""
-    WRONG_DIRECTION = "wrong_direction"
-    """Robot poses inverted, or the other mounting given."""
-
-
-EXPECTED = {
-    Mistake.FLIP: "view_flipped",
-    Mistake.SWAP: "view_shuffled",
-    Mistake.SHIFT: "view_shuffled",
-    Mistake.MOVING: "view_moving",
-    Mistake.GROSS_POSE: "gross_pose",
-    Mistake.WRONG_UNIT: "wrong_unit",
-    Mistake.WRONG_DIRECTION: "wrong_direction",
-}
-TARGETS: tuple[Target, ...] = (TARGET, CircleGrid(4, 4, 0.06, 0.03))
-KINDS = tuple(kind for kind in ErrorKind if kind is not ErrorKind.WRONG_INTRINSICS)
-CELL = CellOptions(
-    views=(8, 20),
-    pixel_sigma_px=(0.05, 0.3),
-    translation_sigma_m=(0.02e-3, 1e-3),
-    rotation_sigma_deg=(0.002, 0.05),
-)
-MOVING_MM, MOVING_DEG = (5.0, 15.0), (0.3, 1.5)
-GROSS_MM, GROSS_DEG = (40.0, 300.0), (4.0, 40.0)
+RUNS_PER_PIECE = 4
+# Views of a set that a run draws.
+FEWEST, MOST = 8, 20
 
 
 @dataclass(frozen=True)
 class Run:
-    """One recording: whether all was said that is wrong with it, and the errors with and without.
+    """One recording with a mistake, or none.
 
-    `translation_mm` and `rotation_deg` are NaN where the recording was refused.
+    `said` is the code of the first finding, empty where there is none. `restored` is None where the mistake
+    is of a kind that nobody can put right. Errors are NaN where the recording was refused.
     """
 
+    recording: str
+    said: str
     named: bool
-    said: tuple[str, ...]
+    answered: bool
+    wrong: bool
+    restored: bool | None
     translation_mm: float
-    rotation_deg: float
     clean_translation_mm: float
-    clean_rotation_deg: float
 
 
 @dataclass(frozen=True)
@@ -90,6 +52,7 @@ class Mistakes:
 
     model: ModelName
     seed: int
+    recordings: tuple[str, ...]
     kinds: dict[Mistake, tuple[Run, ...]]
     clean: tuple[Run, ...]
 
@@ -100,33 +63,35 @@ class Mistakes:
             "study": "mistakes",
             "model": self.model.value,
             "seed": self.seed,
-            "views": list(CELL.views),
-            "kinds": {kind.value: _kind(runs) for kind, runs in self.kinds.items()},
+            "recordings": list(self.recordings),
+            "kinds": {kind.value: _kind(runs) for kind, runs in self.kinds.items() if runs},
             "planted": _kind(planted),
             "clean": {
                 "trials": len(self.clean),
                 "false_alarms": float(np.mean([not run.named for run in self.clean])),
+                "said": sorted({run.said for run in self.clean if not run.named}),
             },
         }
 
 
 def _kind(runs: Sequence[Run]) -> dict[str, Any]:
-    answered = [run for run in runs if np.isfinite(run.translation_mm)]
-    values: dict[str, Any] = {
+    answered = [run for run in runs if run.answered]
+    repaired = [run.restored for run in runs if run.restored is not None]
+    error = float(np.mean([run.translation_mm for run in answered])) if answered else None
+    clean = float(np.mean([run.clean_translation_mm for run in answered])) if answered else None
+    return {
         "trials": len(runs),
         "named": float(np.mean([run.named for run in runs])),
         "answered": len(answered) / len(runs),
+        "wrong_answers": sum(run.wrong for run in runs),
+        "repaired": float(np.mean(repaired)) if repaired else None,
+        "translation_mm": error,
+        "clean_translation_mm": clean,
     }
-    for name in ("translation_mm", "rotation_deg"):
-        error = float(np.mean([getattr(run, name) for run in answered])) if answered else None
-        clean = float(np.mean([getattr(run, f"clean_{name}") for run in answered])) if answered else None
-        values[name], values[f"clean_{name}"] = error, clean
-        quantity = name.partition("_")[0]
-        values[f"{quantity}_ratio"] = error / clean if error is not None and clean else None
-    return values
 
 
 def study_mistakes(
+    sets: Sequence[Recording] = (),
     *,
     kinds: Sequence[Mistake] = tuple(Mistake),
     model: ModelName = ModelName.AUTO,
@@ -135,28 +100,47 @@ def study_mistakes(
     workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Mistakes:
-    """Plant each mistake in `trials` made-up recordings, and none in as many.
+    """Plant each mistake in `trials` recordings, and none in `trials` for each kind of mistake.
 
-    Mountings, targets and errors of the arm take turns.
+    Recordings take turns: simulated ones of both mountings, two targets and all errors of the arm, and random
+    views of the sets.
 
     Raises
     ------
     SolveError
-        A cell could not be drawn, or an estimate failed.
+        A cell could not be drawn, or an estimate of a clean recording failed.
     """
-    planted: list[Mistake | None] = [*map(Mistake, kinds), None]
+    kinds = tuple(map(Mistake, kinds))
+    bases = tuple(_Base(recording, _reference(recording)) for recording in sets)
     jobs = [
-        _Job(kind, ModelName(model), seed, tuple(range(i, min(i + RUNS_PER_PIECE, trials))))
-        for kind in planted
-        for i in range(0, trials, RUNS_PER_PIECE)
+        _Job(kind, ModelName(model), seed, bases, tuple(range(i, min(i + RUNS_PER_PIECE, count))))
+        for kind, count in [*((kind, trials) for kind in kinds), (None, trials * len(kinds))]
+        for i in range(0, count, RUNS_PER_PIECE)
     ]
     done = run_all(_run, jobs, workers=workers, progress=progress)
     results = {
-        kind: tuple(run for job, runs in zip(jobs, done, strict=True) if job.mistake is kind for run in runs)
-        for kind in planted
+        kind: tuple(
+            run for job, runs in zip(jobs, done, strict=True) if job.mistake is kind for run in runs if run
+        )
+        for kind in (*kinds, None)
     }
     named = {kind: runs for kind, runs in results.items() if kind is not None}
-    return Mistakes(ModelName(model), seed, named, results[None])
+    names = ("simulated", *(recording.name for recording in sets))
+    return Mistakes(ModelName(model), seed, names, named, results[None])
+
+
+@dataclass(frozen=True)
+class _Base:
+    """A set, and where its camera truly is as far as that is known."""
+
+    recording: Recording
+    X: Pose
+
+
+def _reference(recording: Recording) -> Pose:
+    if recording.truth is not None and recording.truth.X is not None:
+        return recording.truth.X
+    return solve(recording).X
 
 
 @dataclass(frozen=True)
@@ -164,149 +148,85 @@ class _Job:
     mistake: Mistake | None
     model: ModelName
     seed: int
+    bases: tuple[_Base, ...]
     numbers: tuple[int, ...]
 
 
-def _run(job: _Job) -> list[Run]:
+def _run(job: _Job) -> list[Run | None]:
     return [_one(job, number) for number in job.numbers]
 
 
-def made_up(number: int, seed: int) -> Recording:
-    """Return a clean recording; targets, mountings and errors of the arm take turns."""
-    cell = replace(
-        CELL,
-        target=TARGETS[number % len(TARGETS)],
-        mounting=list(Mounting)[number // len(TARGETS) % 2],
-    )
-    return simulate(KINDS[number // (2 * len(TARGETS)) % len(KINDS)], number, cell, seed=seed)
-
-
-def _one(job: _Job, number: int) -> Run:
-    clean = made_up(number, job.seed)
+def _one(job: _Job, number: int) -> Run | None:
+    mistake = "" if job.mistake is None else job.mistake.value
+    random = np.random.default_rng([job.seed, number, zlib.crc32(mistake.encode())])
+    clean, X_true = _clean(job, number, random)
     if job.mistake is None:
-        said, translation_mm, rotation_deg = _outcome(clean, job.model)
-        return Run(not said, tuple(code for code, _ in said), *(translation_mm, rotation_deg) * 2)
-    random = np.random.default_rng([job.seed, number, zlib.crc32(job.mistake.encode())])
+        findings = diagnose(clean).findings
+        said = next((finding.code for finding in findings if finding.code in CODES), "")
+        return Run(clean.name, said, not said, answered=not said, wrong=False, restored=None, **_NO_ERRORS)
+    if not can_be_planted(clean, job.mistake):
+        return None
     recording, views = plant(clean, job.mistake, random)
-    _, *before = _outcome(clean, job.model)
-    said, *after = _outcome(recording, job.model)
-    named = said == [(EXPECTED[job.mistake], sorted(views))]
-    return Run(named, tuple(code for code, _ in said), *after, *before)
+    before = solve(clean, job.model)
+    diagnosis = diagnose(recording)
+    first = diagnosis.findings[0] if diagnosis.findings else None
+    after = _answer(recording, job.model)
+    if first is None and isinstance(after, HandeyeError):
+        said, concerned = after.code, []
+    else:
+        said = "" if first is None else first.code
+        concerned = [] if first is None else sorted(first.evidence["views"])
+    named = said == EXPECTED[job.mistake] and (not views or concerned == sorted(views))
+    restored = None
+    if diagnosis.repaired is not None and diagnosis.findings:
+        restored = _is_restored(diagnosis.repaired, before, job.model)
+    answered = isinstance(after, Calibration)
+    wrong = isinstance(after, Calibration) and _holds(before, X_true) and not _holds(after, X_true)
+    return Run(
+        clean.name,
+        said,
+        named,
+        answered,
+        wrong,
+        restored,
+        metrics.absolute_error(after.X, X_true).translation_mm if isinstance(after, Calibration) else np.nan,
+        metrics.absolute_error(before.X, X_true).translation_mm,
+    )
 
 
-def _outcome(recording: Recording, model: ModelName) -> tuple[list[tuple[str, list[str]]], float, float]:
-    """What a solve said, with the views (none where it concerns all), and its errors; NaN if it refused."""
+_NO_ERRORS = {"translation_mm": float("nan"), "clean_translation_mm": float("nan")}
+
+
+def _clean(job: _Job, number: int, random: np.random.Generator) -> tuple[Recording, Pose]:
+    """Return a clean recording and its true X: simulated ones and sets take turns."""
+    turn, round_ = number % (len(job.bases) + 2), number // (len(job.bases) + 2)
+    if turn < 2:
+        # Both mountings in turn, then targets and errors of the arm.
+        recording = made_up(4 * round_ + 2 * turn + round_ % 2, job.seed)
+        return recording, _reference(recording)
+    base = job.bases[turn - 2]
+    most = min(MOST, len(base.recording))
+    count = int(random.integers(min(FEWEST, most), most + 1))
+    chosen = np.sort(random.permutation(len(base.recording))[:count])
+    views = [base.recording.views[int(k)] for k in chosen]
+    return replace(base.recording, views=tuple(views)), base.X
+
+
+def _answer(recording: Recording, model: ModelName) -> Calibration | HandeyeError:
     try:
-        calibration = solve(recording, model)
-    except InputError as error:
-        return [(error.code, [])], float("nan"), float("nan")
-    said = [(f.code, sorted(f.evidence["views"])) for f in calibration.diagnosis if f.code in CODES]
-    error = metrics.absolute_error(calibration.X, true_hand_eye(recording))
-    return said, error.translation_mm, error.rotation_deg
+        return solve(recording, model)
+    except HandeyeError as error:
+        return error
 
 
-def plant(recording: Recording, mistake: Mistake, random: np.random.Generator) -> tuple[Recording, list[str]]:
-    """Plant a mistake; also the names of the views with it, empty if it is in all."""
-    views = list(recording.views)
-    k = int(random.integers(len(views)))
-    view = views[k]
-    if mistake is Mistake.FLIP:
-        others = [*turns(recording.target)[1:], *reflections(recording.target)]
-        views[k] = others[int(random.integers(len(others)))].applied(view)
-        return recording.with_views(views), [view.name]
-    if mistake is Mistake.SWAP:
-        other = (k + 1 + int(random.integers(len(views) - 1))) % len(views)
-        views[k], views[other] = _with_image(view, views[other]), _with_image(views[other], view)
-        return recording.with_views(views), [view.name, views[other].name]
-    if mistake is Mistake.SHIFT:
-        count = len(views)
-        # Most of the list must be right for the rest to be told from it; else it is the whole list.
-        length = int(random.integers(3, count // 2)) if random.uniform() < 0.5 and count > 7 else count
-        first = int(random.integers(count - length + 1))
-        row = views[first : first + length]
-        views[first : first + length] = map(_with_image, row, [*row[1:], row[0]])
-        return recording.with_views(views), [] if length == count else [v.name for v in row]
-    if mistake is Mistake.MOVING:
-        views[k] = _at(view, view.T_base_flange @ Pose.exp(_moved(views, k, random)))
-        return recording.with_views(views), [view.name]
-    if mistake is Mistake.GROSS_POSE:
-        error = Pose.exp(_twist(random, GROSS_MM, GROSS_DEG))
-        views[k] = _at(view, view.T_base_flange @ error)
-        return recording.with_views(views), [view.name]
-    if mistake is Mistake.WRONG_UNIT:
-        return _in_another_unit(recording, random), []
-    # Inverted poses, or the camera said to be where it is not: the same numbers for another reason.
-    if random.uniform() < 0.5:
-        other_mounting = next(m for m in Mounting if m is not recording.mounting)
-        return replace(recording, mounting=other_mounting), []
-    return recording.with_views(_at(v, v.T_base_flange.inverse()) for v in views), []
+def _holds(calibration: Calibration, X_true: Pose) -> bool:
+    squared = metrics.nees(calibration.X, calibration.covariance, X_true)
+    return metrics.region_holds(squared, calibration.degrees_of_freedom)
 
 
-def _at(view: View, pose: Pose) -> View:
-    # Joint angles would tell another story than the pose.
-    return replace(view, T_base_flange=pose, joints_rad=None)
-
-
-def _with_image(view: View, other: View) -> View:
-    return replace(view, point_ids=other.point_ids, pixels=other.pixels)
-
-
-def _between(random: np.random.Generator, bounds: tuple[float, float]) -> float:
-    low, high = bounds
-    return low * (high / low) ** random.uniform()
-
-
-def _direction(random: np.random.Generator) -> FloatArray:
-    vector = random.standard_normal(3)
-    return vector / np.linalg.norm(vector)
-
-
-def _twist(
-    random: np.random.Generator, millimetres: tuple[float, float], degrees: tuple[float, float]
-) -> FloatArray:
-    shift = _direction(random) * _between(random, millimetres) / MM_PER_M
-    return np.concatenate([shift, _direction(random) * np.deg2rad(_between(random, degrees))])
-
-
-def _moved(views: Sequence[View], k: int, random: np.random.Generator) -> FloatArray:
-    """Return a twist in the flange frame: any small one, or a part of the way to the next view."""
-    if random.uniform() < 0.5 or k + 1 == len(views):
-        return _twist(random, MOVING_MM, MOVING_DEG)
-    way = (views[k].T_base_flange.inverse() @ views[k + 1].T_base_flange).log()
-    share = _between(random, MOVING_MM) / MM_PER_M / float(np.linalg.norm(way[:3]))
-    return way * min(share, 0.25)
-
-
-def _in_another_unit(recording: Recording, random: np.random.Generator) -> Recording:
-    """Translations of the robot, its rotation vectors, or the target's measures taken for another unit."""
-    what = random.uniform()
-    if what < 0.25:
-        return _larger_target(recording, MM_PER_M)
-    if what < 0.5:
-        return recording.with_views(_at(v, _degrees_for_radians(v.T_base_flange)) for v in recording.views)
-    per_metre = (MM_PER_M, MM_PER_M, 100.0, 1 / 0.0254)[int(random.integers(4))]
-    return recording.with_views(_at(v, _in_unit(v.T_base_flange, per_metre)) for v in recording.views)
-
-
-def _in_unit(pose: Pose, per_metre: float) -> Pose:
-    matrix = pose.matrix.copy()
-    matrix[:3, 3] *= per_metre
-    return Pose(matrix)
-
-
-def _degrees_for_radians(pose: Pose) -> Pose:
-    """Return what comes out where a rotation vector in radians is read as degrees."""
-    vector = np.deg2rad(pose.log()[3:])
-    matrix = Pose.exp([0, 0, 0, *vector]).matrix.copy()
-    matrix[:3, 3] = pose.translation
-    return Pose(matrix)
-
-
-def _larger_target(recording: Recording, factor: float) -> Recording:
-    target = recording.target
-    if isinstance(target, Chessboard):
-        return replace(recording, target=replace(target, pitch_m=target.pitch_m * factor))
-    if isinstance(target, CircleGrid):
-        larger = replace(target, pitch_m=target.pitch_m * factor, diameter_m=target.diameter_m * factor)
-        return replace(recording, target=larger)
-    raise InputError(f"{target.family}: no board of these studies")
+def _is_restored(repaired: Recording, clean: Calibration, model: ModelName) -> bool:
+    calibration = _answer(repaired, model)
+    if not isinstance(calibration, Calibration):
+        return False
+    radius = within(clean.covariance, clean.degrees_of_freedom).translation_mm
+    return metrics.absolute_error(calibration.X, clean.X).translation_mm < radius

@@ -20,6 +20,7 @@ use crate::positive::Factor;
 use crate::simd::{MAX_LANES, VectorUnit, dispatch};
 
 /// A prior on parameters.
+#[derive(Clone)]
 pub(super) struct Prior {
     pub of: &'static str,
     pub levels: Vec<usize>,
@@ -67,6 +68,7 @@ fn add(to: &mut DMatrix<f64>, factor: f64, m: &DMatrix<f64>) {
 }
 
 /// Noise that is new at every station.
+#[derive(Clone)]
 pub(super) struct Noise {
     pub of: &'static str,
     pub levels: Vec<usize>,
@@ -84,6 +86,7 @@ pub(super) struct Whitened {
 }
 
 /// Rows of a station, as the kernels want them.
+#[derive(Clone)]
 pub(super) struct Station {
     pub size: usize,
     /// `[B e]` row by row, padded to whole vectors.
@@ -236,6 +239,53 @@ impl Mixed {
             given_right,
             unit: VectorUnit::widest(),
         }
+    }
+
+    /// The same model of some of the stations only; what all pixels say of camera and board stays.
+    pub fn among(&self, chosen: &[usize]) -> Self {
+        let of = |all: &[DMatrix<f64>]| -> Vec<DMatrix<f64>> {
+            chosen.iter().filter_map(|k| all.get(*k)).cloned().collect()
+        };
+        let noise = |x: &Noise| Noise { roots: of(&x.roots), squares: of(&x.squares), ..x.clone() };
+        Self {
+            levels: self.levels.clone(),
+            components: self.components.clone(),
+            constants: self.constants.clone(),
+            stations: chosen.iter().map(|k| self.stations[*k].clone()).collect(),
+            noises: self.noises.iter().map(noise).collect(),
+            priors: self.priors.iter().map(|p| Prior { squares: of(&p.squares), ..p.clone() }).collect(),
+            given: self.given.clone(),
+            given_right: self.given_right.clone(),
+            ..*self
+        }
+    }
+
+    /// Number of stations.
+    pub fn stations(&self) -> usize {
+        self.stations.len()
+    }
+
+    /// Number of rows of all stations.
+    pub fn rows(&self) -> usize {
+        self.stations.iter().map(|station| station.size).sum()
+    }
+
+    /// Noise of a station's twists at levels `exp(t)`, and what parameters theta with their covariance leave of the
+    /// twists: their mean, and the covariance that comes from the parameters alone. Nothing may recur.
+    pub fn residual(
+        &self,
+        k: usize,
+        t: &DVector<f64>,
+        (theta, covariance): (&DVector<f64>, &DMatrix<f64>),
+    ) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>) {
+        let station = &self.stations[k];
+        let mut noise = station.pixels.clone();
+        for x in &self.noises {
+            add(&mut noise, Self::deviation(&x.levels, t).powi(2), &x.squares[k]);
+        }
+        let rows = DMatrix::from_fn(station.size, self.size, |i, j| station.rows[i * self.width + j]);
+        let e = DVector::from_fn(station.size, |i, _| station.rows[i * self.width + self.size]);
+        (noise, e + &rows * theta, &rows * covariance * rows.transpose())
     }
 
     /// Logarithms of the levels to begin with.

@@ -10,6 +10,7 @@
 //! Sources: Patterson and Thompson 1971 and Harville 1977 (restricted likelihood), Gilmour, Thompson and Cullis 1995
 //! (average information), Rue, Martino and Chopin 2009 (nested Laplace), Huber 1967 and White 1980 (sandwich).
 
+mod agreement;
 mod cell;
 mod cell_start;
 mod component;
@@ -29,12 +30,12 @@ mod slopes;
 mod start;
 mod systems;
 mod twists;
-mod view_sets;
 mod weak_prior;
 
 #[cfg(test)]
 mod tests;
 
+pub use agreement::{Agreement, SetFit};
 pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station};
 pub use cell_start::{CellStart, start_of_cell};
 pub use components::Assumptions;
@@ -43,5 +44,4 @@ pub use pixel_field::{SlowResiduals, shared_error};
 pub use pose_measurement::{PoseMeasurement, compress, relative_weights, shrunk_variances};
 pub use posterior::{Attribution, Node, Options, Posterior, estimate};
 pub use start::{ChainStart, start_from_poses};
-pub use view_sets::{LinearisedView, NoiseLevel, SetFit, ViewSets};
 pub use weak_prior::WeakPrior;

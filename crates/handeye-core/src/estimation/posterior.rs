@@ -142,7 +142,12 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
     gather(cell, &guess, &mixed, (nodes, at_mode), &found, come)
 }
 
-fn assemble(cell: &Cell, guess: &Guess, components: &[Box<dyn Component>], weak: &WeakPrior) -> Mixed {
+pub(super) fn assemble(
+    cell: &Cell,
+    guess: &Guess,
+    components: &[Box<dyn Component>],
+    weak: &WeakPrior,
+) -> Mixed {
     let linearisation = linearise(cell, guess);
     let end = cell.columns().end;
     let mut information = DMatrix::zeros(end, end);
@@ -159,7 +164,7 @@ fn assemble(cell: &Cell, guess: &Guess, components: &[Box<dyn Component>], weak:
     Mixed::new(&linearisation, components, (&information, &right), cell)
 }
 
-fn singular() -> Error {
+pub(super) fn singular() -> Error {
     Error::numerical("the model of the measurements is singular")
 }
 
@@ -174,16 +179,16 @@ fn largest_share(answer: &Evaluation, poses: usize) -> f64 {
         .fold(0.0, f64::max)
 }
 
-struct Mode {
-    t: DVector<f64>,
-    value: f64,
-    curvature: DMatrix<f64>,
+pub(super) struct Mode {
+    pub t: DVector<f64>,
+    pub value: f64,
+    pub curvature: DMatrix<f64>,
     steps: usize,
     at_rest: bool,
 }
 
 /// Newton's method on the levels, damped until the penalised likelihood falls.
-fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Error> {
+pub(super) fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Error> {
     let mut t = start;
     let mut now = mixed.evaluate(&t, Wanted::Slope).ok_or_else(singular)?;
     let mut damping = 1e-2;

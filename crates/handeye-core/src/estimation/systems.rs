@@ -65,34 +65,3 @@ pub(super) fn substitute<V: Vector>(n: usize, system: &[V], inverses: &[V], solu
         solution[i] = sum * inverses[i];
     }
 }
-
-/// Column `c` of the inverse, from the diagonal on.
-#[inline(always)]
-pub(super) fn invert_column<S: Simd>(
-    simd: S,
-    n: usize,
-    c: usize,
-    system: &[S::Vector],
-    inverses: &[S::Vector],
-    column: &mut [S::Vector],
-) {
-    for entry in &mut column[c..n] {
-        *entry = simd.splat(0.0);
-    }
-    column[c] = simd.splat(1.0);
-    for k in c..n {
-        let row = start_of(n, k);
-        let scaled = column[k] * inverses[k];
-        for i in k + 1..n {
-            column[i] = system[row + i - k].neg_mul_add(scaled, column[i]);
-        }
-    }
-    for k in (c..n).rev() {
-        let row = start_of(n, k);
-        let mut sum = column[k];
-        for i in k + 1..n {
-            sum = system[row + i - k].neg_mul_add(column[i], sum);
-        }
-        column[k] = sum * inverses[k];
-    }
-}

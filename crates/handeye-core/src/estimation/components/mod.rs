@@ -18,11 +18,16 @@ use super::cell::Cell;
 use super::component::{Component, per_station};
 use crate::error::Error;
 
-/// The components of a cell.
-///
-/// # Errors
-/// [`Error::InvalidInput`] where the stations' arms do not fit the assumptions.
-pub(super) fn all(cell: &Cell, assumptions: &Assumptions) -> Result<Vec<Box<dyn Component>>, Error> {
+/// Components of a cell whose robot errs in a new way at every station.
+pub(super) fn independent(cell: &Cell) -> Vec<Box<dyn Component>> {
+    let mut all = of_pictures(cell);
+    all.push(Box::new(robot_pose::RobotPose::flange()));
+    all.push(Box::new(robot_pose::RobotPose::base()));
+    all
+}
+
+/// Cameras and boards.
+fn of_pictures(cell: &Cell) -> Vec<Box<dyn Component>> {
     let mut all: Vec<Box<dyn Component>> = Vec::new();
     for (c, camera) in cell.cameras.iter().enumerate() {
         if let Some(prior) = &camera.prior {
@@ -35,11 +40,18 @@ pub(super) fn all(cell: &Cell, assumptions: &Assumptions) -> Result<Vec<Box<dyn 
     if let Some(detector) = detector::Detector::of(cell) {
         all.push(Box::new(detector));
     }
+    all
+}
+
+/// The components of a cell.
+///
+/// # Errors
+/// [`Error::InvalidInput`] where the stations' arms do not fit the assumptions.
+pub(super) fn all(cell: &Cell, assumptions: &Assumptions) -> Result<Vec<Box<dyn Component>>, Error> {
     if assumptions.exact_robot {
-        return Ok(all);
+        return Ok(of_pictures(cell));
     }
-    all.push(Box::new(robot_pose::RobotPose::flange()));
-    all.push(Box::new(robot_pose::RobotPose::base()));
+    let mut all = independent(cell);
     if let Some(lag) = time_lag::TimeLag::of(cell) {
         all.push(Box::new(lag));
     }

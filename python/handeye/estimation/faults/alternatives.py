@@ -1,0 +1,243 @@
+"""Other ways to understand all views at once, tried where the views do not agree as they are given.
+
+There are hundreds; all are ranked by how well X and Y in closed form bring chain and images together, and the
+best are explained like the recording as given. One is named if its evidence is clearly larger.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from handeye.errors import HandeyeError
+from handeye.estimation.faults.consensus import closed_forms, distances
+from handeye.estimation.faults.explanation import Explanation, explain
+from handeye.estimation.faults.kinds import (
+    HYPOTHESES,
+    Hypothesis,
+    SharedFaultError,
+    inconsistent,
+    view_shuffled,
+    wrong_direction,
+)
+from handeye.estimation.faults.shuffles import find_pairing
+from handeye.estimation.faults.stations import Stations, centres, inverted, target_centre
+from handeye.estimation.measurements import Measurements
+from handeye.types.arrays import FloatArray, IndexArray
+from handeye.types.mounting import Mounting
+from handeye.types.recording import Recording
+
+# Logarithm of the factor in evidence that another way to understand all views must have.
+CLEARLY_BETTER = 20.0
+# So many are explained, of those whose misfit is less than this share of that as given.
+MOST_EXPLAINED = 8
+BETTER_SHARE = 0.7
+# Angles between views may be off by so much, in the middle, before a reading is dropped.
+TURN_SLACK_RAD = np.deg2rad(2.0)
+# Of what has no change, such as views that have to be taken again.
+DENSITY_OF_NO_MISTAKE = -30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another way to understand all views, and how well it explains them."""
+
+    hypothesis: Hypothesis
+    explanation: Explanation
+    log_evidence: float
+
+
+def find_alternative(measurements: Measurements, given: Explanation | None) -> Alternative | None:
+    """Find another way to understand all views that explains them much better, None if there is none."""
+    bearable = given is not None and given.constants_are_bearable
+    needed = given.log_evidence + CLEARLY_BETTER if given is not None and bearable else -math.inf
+    best: Alternative | None = None
+    for hypothesis in [*_promising(measurements), *_paired(measurements, given)]:
+        try:
+            explanation = explain(hypothesis.applied(measurements))
+        except HandeyeError:
+            continue
+        evidence = explanation.log_evidence + hypothesis.log_prior + hypothesis.log_unit
+        if evidence > needed and explanation.is_bearable and (best is None or evidence > best.log_evidence):
+            best = Alternative(hypothesis, explanation, evidence)
+    return best
+
+
+def refuse_alternative(
+    measurements: Measurements, given: Explanation | None, alternative: Alternative | None
+) -> Explanation:
+    """Return the explanation of the views as given, where nothing explains them better.
+
+    Raises
+    ------
+    SharedFaultError
+        The code names the fault.
+    """
+    if alternative is not None:
+        raise _told(measurements, given, alternative)
+    if given is None:
+        raise inconsistent.error(0, len(measurements), math.inf, math.inf)
+    if not given.is_bearable:
+        raise inconsistent.error(int(given.members.sum()), len(given.members), *given.levels)
+    return given
+
+
+def _told(
+    measurements: Measurements, given: Explanation | None, alternative: Alternative
+) -> SharedFaultError:
+    hypothesis, explanation = alternative.hypothesis, alternative.explanation
+    sentence, hint = hypothesis.sentence, hypothesis.hint
+    if hypothesis.kind is wrong_direction.KIND:
+        fit = explanation.selection.fit
+        sentence, hint, mounting = wrong_direction.told(measurements.mounting, fit.X, fit.Y)
+        if mounting:
+            hypothesis = replace(hypothesis, name="mounting", change=_other_mounting)
+    numbers = comparison(explanation, given)
+    apart = (
+        f"; as given, {numbers['agreeing_as_given']} within "
+        f"{numbers['robot_translation_mm_as_given']:.3g} mm and "
+        f"{numbers['robot_rotation_deg_as_given']:.2g} deg"
+        if given is not None
+        else ""
+    )
+    return SharedFaultError(
+        f"{sentence}: read so, {numbers['agreeing']} of {numbers['views']} views agree within "
+        f"{numbers['robot_translation_mm']:.2g} mm and {numbers['robot_rotation_deg']:.2g} deg{apart}",
+        hypothesis,
+        hint=hint,
+    )
+
+
+def _other_mounting(recording: Recording) -> Recording:
+    return replace(recording, mounting=next(m for m in Mounting if m is not recording.mounting))
+
+
+def comparison(explanation: Explanation, given: Explanation | None) -> dict[str, Any]:
+    """Return how many views agree and how well, so and as given."""
+    translation, rotation = explanation.levels
+    numbers: dict[str, Any] = {
+        "views": len(explanation.members),
+        "agreeing": int(explanation.members.sum()),
+        "robot_translation_mm": translation * 1e3,
+        "robot_rotation_deg": float(np.rad2deg(rotation)),
+    }
+    if given is not None:
+        translation, rotation = given.levels
+        numbers |= {
+            "agreeing_as_given": int(given.members.sum()),
+            "robot_translation_mm_as_given": translation * 1e3,
+            "robot_rotation_deg_as_given": float(np.rad2deg(rotation)),
+        }
+    return numbers
+
+
+def _promising(measurements: Measurements) -> list[Hypothesis]:
+    """Return the hypotheses under which X and Y in closed form miss least, of equals the more usual."""
+    limit = BETTER_SHARE * _misfit(measurements.motions, measurements.camera_poses, measurements)
+    ranked: list[tuple[float, float, int, Hypothesis]] = []
+    robot = np.array([view.T_base_flange.matrix for view in measurements.views])
+    # Rotation angles between the views are those of the robot, however camera and target are fixed: few
+    # readings of the rotations are left then.
+    seen = _turns(measurements.camera_poses)
+    slack = max(TURN_SLACK_RAD, BETTER_SHARE * _median_gap(_turns(robot), seen))
+    every = (h for hypotheses in HYPOTHESES for h in hypotheses(measurements))
+    for number, hypothesis in enumerate(every):
+        try:
+            if hypothesis.poses is not None:
+                meant = hypothesis.poses(robot)
+                if not np.isfinite(meant).all() or _median_gap(_turns(meant), seen) > slack:
+                    continue
+                in_hand = measurements.mounting is Mounting.EYE_IN_HAND
+                misfit = _misfit(
+                    inverted(meant) if in_hand else meant, measurements.camera_poses, measurements
+                )
+            else:
+                changed = hypothesis.applied(measurements)
+                misfit = _misfit(changed.motions, changed.camera_poses, changed)
+        except (HandeyeError, np.linalg.LinAlgError):
+            continue
+        if misfit < limit:
+            ranked.append((misfit, -hypothesis.log_prior, number, hypothesis))
+    ranked.sort(key=lambda entry: (round(math.log(max(entry[0], 1e-12)), 3), entry[1], entry[2]))
+    return [hypothesis for *_, hypothesis in ranked[:MOST_EXPLAINED]]
+
+
+def _turns(poses: FloatArray) -> FloatArray:
+    """Return the rotation angles between all pairs of poses (K, 4, 4)."""
+    flat = poses[:, :3, :3].reshape(len(poses), 9)
+    return np.arccos(np.clip(((flat @ flat.T)[np.triu_indices(len(flat), 1)] - 1) / 2, -1, 1))
+
+
+def _median_gap(one: FloatArray, other: FloatArray) -> float:
+    return float(np.median(np.abs(one - other)))
+
+
+def _misfit(motions: FloatArray, poses: FloatArray, measurements: Measurements) -> float:
+    """Median distance between chain and images as a share of the working distance, in closed form."""
+    centre = target_centre(measurements.target)
+    lever = float(np.median(np.linalg.norm(centres(poses, centre), axis=1)))
+    kept = np.arange(len(poses))
+    away = np.zeros(len(poses))
+    for _ in range(2):  # Again without those that fit worst.
+        X, Y = closed_forms(motions[np.newaxis, kept], poses[np.newaxis, kept])
+        away = distances(X @ motions @ Y, poses, centre, lever)
+        kept = np.sort(np.argsort(away)[: max(3, math.ceil(0.7 * len(poses)))])
+    return float(np.median(away)) / lever
+
+
+def _paired(measurements: Measurements, given: Explanation | None) -> Iterator[Hypothesis]:
+    """Yield the images paired again with the robot poses, where most of the list is wrong."""
+    stations = Stations.of(measurements)
+    pairing = find_pairing(stations)
+    if pairing is None:
+        return
+    count = len(stations)
+    images = np.flatnonzero(pairing >= 0)
+    moved = [(int(i), int(pairing[i])) for i in images if pairing[i] != i]
+    # Where the others are enough to tell the rest by, these can be paired again and used.
+    if not moved or (given is not None and len(moved) <= count // 2 and given.is_bearable):
+        return
+    names = [view.name for view in measurements.views]
+    left = count - len(images)
+    yield Hypothesis(
+        view_shuffled.KIND,
+        "paired",
+        view_shuffled.shuffled_words(names, moved),
+        "pair each image with the robot pose at which it was taken",
+        _Paired(names, pairing),
+        log_prior=left * _typical_mistake(given) - math.lgamma(count + 1),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Paired:
+    """Images paired with the robot poses of other views; those without one are left out."""
+
+    names: list[str]
+    pairing: IndexArray
+
+    def __call__(self, recording: Recording) -> Recording:
+        at = {view.name: view for view in recording.views}
+        views = [
+            replace(
+                at[self.names[motion]],
+                point_ids=at[self.names[image]].point_ids,
+                pixels=at[self.names[image]].pixels,
+                sigmas_px=at[self.names[image]].sigmas_px,
+                image=at[self.names[image]].image,
+            )
+            for image, motion in enumerate(self.pairing.tolist())
+            if motion >= 0
+        ]
+        return recording.with_views(sorted(views, key=lambda view: self.names.index(view.name)))
+
+
+def _typical_mistake(given: Explanation | None) -> float:
+    """Logarithm of the density of a mistaken view, for views that a pairing leaves over."""
+    if given is None or given.members.all():
+        return DENSITY_OF_NO_MISTAKE
+    selection = given.selection
+    density = selection.fit.log_density + selection.log_odds
+    return float(np.median(density[~given.members]))

@@ -1,0 +1,91 @@
+"""What the pictures say by themselves: a camera that is not theirs, pictures that are sheared."""
+
+from dataclasses import replace
+from functools import partial
+
+from handeye.estimation.faults.kinds import (
+    Hypothesis,
+    Kind,
+    SharedFaultError,
+    missing_distortion,
+    sheared_pictures,
+    wrong_camera,
+)
+from handeye.estimation.faults.recalibration import Recalibrated, median_px, recalibrated
+from handeye.estimation.measurements import Measurements
+from handeye.types.calibration import Finding
+from handeye.types.camera import Camera
+from handeye.types.recording import Recording
+
+# Views that fit their own pose within this need no other camera.
+HEALTHY_PX = 0.35
+# A camera of their own must bring the residual of the views down to this share; no nine parameters do that to
+# noise.
+WRONG_SHARE = 0.75
+# What a shear leaves of the residual.
+SHEAR_SHARE = 0.5
+# Rows shifted by less than this share of their height are no shear.
+LEAST_SHEAR = 0.003
+
+
+def examine_pictures(measurements: Measurements, *, closely: bool = False) -> tuple[Finding, ...]:
+    """Compare the residuals of single views with what a camera of their own would leave.
+
+    Parameters
+    ----------
+    measurements
+        The views.
+    closely
+        Look even where the residuals are small, as robot and images do not agree.
+
+    Raises
+    ------
+    SharedFaultError
+        The camera is not that of the pictures, or they are sheared.
+    """
+    before = median_px(measurements)
+    if before < (0.2 * HEALTHY_PX if closely else HEALTHY_PX):
+        return ()
+    found = None if measurements.camera.from_views else recalibrated(measurements)
+    after = before if found is None else found.after_px
+    if after > HEALTHY_PX:  # No camera explains them.
+        shear, left = sheared_pictures.find_shear(measurements)
+        if left < SHEAR_SHARE * after and abs(shear) > LEAST_SHEAR:
+            raise _sheared(before, shear, left)
+    if found is None:
+        return ()
+    given = measurements.camera
+    kind, sentence = wrong_camera.told(given, found.camera)
+    if not given.distortion.any() and kind is wrong_camera.LENS:
+        if after < WRONG_SHARE * before:
+            return (missing_distortion.finding(before, after),)
+        return ()
+    if after < WRONG_SHARE * before:
+        raise _other_camera(kind, sentence, found)
+    return ()
+
+
+def _other_camera(kind: Kind, sentence: str, found: Recalibrated) -> SharedFaultError:
+    hint = "give the calibration of this camera at this size, or leave the camera out: it is then calibrated "
+    hint += "from the pictures"
+    change = partial(_with_camera, camera=found.camera)
+    return SharedFaultError(
+        f"{sentence}: the points of a view fit within {found.before_px:.2g} px, through a camera found from "
+        f"the pictures within {found.after_px:.2g} px",
+        Hypothesis(kind, "recalibrated", sentence, hint, change),
+    )
+
+
+def _sheared(before_px: float, shear: float, after_px: float) -> SharedFaultError:
+    sentence = f"the pictures are sheared: every row is shifted by {-shear:+.4f} px against the one above"
+    hint = "read the frames with the right row length, and take the pictures again"
+    change = partial(sheared_pictures.sheared, shear=shear)
+    return SharedFaultError(
+        f"{sentence}; the points of a view fit within {before_px:.2g} px, with rows shifted back within "
+        f"{after_px:.2g} px",
+        Hypothesis(sheared_pictures.KIND, "sheared", sentence, hint, change),
+    )
+
+
+def _with_camera(recording: Recording, camera: Camera) -> Recording:
+    return replace(recording, camera=camera)
