@@ -181,3 +181,28 @@ def test_a_real_camera_is_asked_for_one_picture(monkeypatch: pytest.MonkeyPatch,
     with pytest.raises(InputError, match="expected one of"):
         nominal_camera((640, 480), "brown_conrady_12")
     assert SelfCalibration.of_session({}, prepared.recording) is None
+
+
+def test_decisions_go_on_from_what_was_known_at_the_beginning(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    made, pictured = prepare(configured(0)), prepare(configured(0, points_only=None))
+
+    class Watched:
+        def grab(self, label: str) -> Frame:
+            return (pictured if label == "size_of_image" else made).cell.source.grab(label)
+
+    monkeypatch.setattr(configurations, "open_robot", lambda *_, **__: made.cell.robot)
+    monkeypatch.setattr(configurations, "open_camera", lambda *_, **__: Watched())
+    space = ((-1.0, -1.0, 0.0), (1.0, 1.0, 1.5))
+    real = replace(configured(0), driver="mine", images="mine", workspace_m=space)
+    session, store = begin(prepare(real, target=made.cell.target), tmp_path / "s")
+    for _ in range(4):
+        step = session.next()
+        assert isinstance(step, Step)
+        session.take(step)
+    store.close()
+    _, store, again = go_on(tmp_path / "s")
+    assert store.recording.camera.from_views
+    assert again.cell.camera == nominal_camera((1280, 1024))
+    store.close()

@@ -20,9 +20,10 @@ from handeye.estimation import Estimate
 from handeye.estimation.confidence import within
 from handeye.planning.batch import plan_batch
 from handeye.planning.feasibility import Generator
-from handeye.session.configuration import Prepared, begin, prepare
+from handeye.session.configuration import begin, prepare
 from handeye.session.deciding import START_VIEWS
 from handeye.session.loop import End, Session
+from handeye.session.prepared import Prepared
 from handeye.session.settings import Configuration
 from handeye.types import Pose, Target
 from handeye.types.arrays import FloatArray
