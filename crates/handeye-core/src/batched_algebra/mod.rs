@@ -14,7 +14,7 @@ use crate::simd::{Simd, Vector};
 pub(crate) use factor::{factorise, log_pivots};
 pub(crate) use moments::Sums;
 pub(crate) use plane_moments::PlaneMoments;
-pub(crate) use symmetric::{UPPER, triangle, upper};
+pub(crate) use symmetric::{UPPER, upper};
 
 /// Lanes `at..` of each row.
 #[inline(always)]

@@ -1,7 +1,5 @@
 //! Symmetric 6 x 6 matrices by their upper triangle.
 
-use nalgebra::Matrix6;
-
 /// Entries of a symmetric 6 x 6 matrix, upper triangle row by row.
 pub(crate) const UPPER: usize = 21;
 
@@ -9,17 +7,6 @@ pub(crate) const UPPER: usize = 21;
 pub(crate) const fn upper(i: usize, j: usize) -> usize {
     let (i, j) = if i <= j { (i, j) } else { (j, i) };
     i * 6 - i * (i + 1) / 2 + j
-}
-
-/// The upper triangle of a symmetric matrix.
-pub(crate) fn triangle(m: &Matrix6<f64>) -> [f64; UPPER] {
-    let mut out = [0.0; UPPER];
-    for i in 0..6 {
-        for j in i..6 {
-            out[upper(i, j)] = m[(i, j)];
-        }
-    }
-    out
 }
 
 #[cfg(test)]
