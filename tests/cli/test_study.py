@@ -178,10 +178,11 @@ def test_mistakes_have_the_promised_keys(capsys: pytest.CaptureFixture[str], tmp
     assert code == 0
     assert list(document["kinds"]) == ["flip", "moving"]
     assert document["planted"]["trials"] == 2
-    assert document["clean"] == {"trials": 1, "false_alarms": 0.0}
+    assert document["clean"] == {"trials": 2, "false_alarms": 0.0, "said": []}
     for found in document["kinds"].values():
-        assert (found["named"], found["answered"]) == (1.0, 1.0)
-        assert found["translation_ratio"] > 0
+        assert (found["named"], found["answered"], found["repaired"]) == (1.0, 1.0, 1.0)
+        assert found["wrong_answers"] == 0
+        assert found["translation_mm"] < 2 * found["clean_translation_mm"]
     assert json.loads((tmp_path / "mistakes.json").read_text()) == document
     assert run(["study", "mistakes", "--trials", "1", "--kinds", "flip", "--workers", "1"]) == 0
     assert "false alarms: 0.0 % of 1 recordings" in capsys.readouterr().out
