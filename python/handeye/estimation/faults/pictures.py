@@ -3,6 +3,9 @@
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
+from handeye import _core
 from handeye.estimation.faults.kinds import (
     Hypothesis,
     Kind,
@@ -24,6 +27,8 @@ HEALTHY_PX = 0.35
 WRONG_SHARE = 0.75
 # And the residual of views that fit their own pose.
 SMALL_SHARE = 0.35
+# Residuals of fewer of the standard deviations that the camera states for itself are no fault.
+STATED_SHARE = 3.0
 # What a shear leaves of the residual.
 SHEAR_SHARE = 0.5
 # Rows shifted by less than this share of their height are no shear.
@@ -57,6 +62,9 @@ def examine_pictures(measurements: Measurements, *, closely: bool = False) -> tu
     if found is None:
         return ()
     given = measurements.camera
+    if before < STATED_SHARE * _stated_px(given):
+        # The calibration itself says that it is no better: the estimate takes it as it is meant.
+        return ()
     kind, sentence = wrong_camera.told(given, found.camera)
     if not given.distortion.any() and kind is wrong_camera.LENS:
         if after < WRONG_SHARE * before:
@@ -66,6 +74,18 @@ def examine_pictures(measurements: Measurements, *, closely: bool = False) -> tu
     if after < (WRONG_SHARE if before > HEALTHY_PX else SMALL_SHARE) * before:
         raise _other_camera(kind, sentence, found)
     return ()
+
+
+def _stated_px(camera: Camera) -> float:
+    """Root mean square over the image of the pixel deviation that a camera's own covariance means."""
+    if camera.covariance is None:
+        return 0.0
+    width, height = camera.size_px
+    u, v = np.meshgrid(np.linspace(0, width - 1, 7), np.linspace(0, height - 1, 7))
+    rays, seen = camera.unproject(np.stack([u.ravel(), v.ravel()], axis=1))
+    _, _, moved, valid = _core.project_jacobians(camera.lens, camera.parameters, rays[seen])
+    moved = moved[valid]
+    return float(np.sqrt(np.einsum("kai,ij,kaj->k", moved, camera.covariance, moved).mean()))
 
 
 def _other_camera(kind: Kind, sentence: str, found: Recalibrated) -> SharedFaultError:
