@@ -62,10 +62,10 @@ def examine_pictures(measurements: Measurements, *, closely: bool = False) -> tu
     if found is None:
         return ()
     given = measurements.camera
-    if before < STATED_SHARE * _stated_px(given):
+    kind, sentence = wrong_camera.told(given, found.camera)
+    if kind is wrong_camera.LENS and before < STATED_SHARE * _stated_px(given):
         # The calibration itself says that it is no better: the estimate takes it as it is meant.
         return ()
-    kind, sentence = wrong_camera.told(given, found.camera)
     if not given.distortion.any() and kind is wrong_camera.LENS:
         if after < WRONG_SHARE * before:
             return (missing_distortion.finding(before, after),)
