@@ -137,3 +137,20 @@ def test_a_wrong_board_does_not_fit() -> None:
     except HandeyeError:
         return
     assert fit.rmse_px > 5
+
+
+def test_a_lens_is_an_ordinary_one_until_views_say_otherwise() -> None:
+    """A few small boards in the middle say nothing of the edge: coefficients must not run off to fit noise."""
+    random, found = np.random.default_rng(5), dict[str, Detection]()
+    board, camera = TARGETS["chessboard"], CAMERAS["brown_conrady_5"]
+    for index, turn in enumerate(TURNS[:4]):
+        pixels = scene(board, camera, turn, share=0.3).pixels
+        found[f"im_{index}"] = Detection(
+            np.arange(len(pixels)), pixels + 0.2 * random.normal(size=pixels.shape)
+        )
+    believed, free = (
+        calibrate_camera(board, found, camera.size_px, lens="brown_conrady_5", ordinary=ordinary).camera
+        for ordinary in (True, False)
+    )
+    assert np.abs(believed.distortion).max() < 0.4
+    assert np.abs(free.distortion).max() > 1.0
