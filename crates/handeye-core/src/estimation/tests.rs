@@ -210,3 +210,22 @@ fn neighbours_that_err_alike_are_told_from_chance() {
     assert!((shared_error(&[alike; 8]) - 7.0).abs() < 1e-12);
     assert_eq!(shared_error(&[]), 1.0);
 }
+
+#[test]
+fn pixels_twice_as_noisy_are_poses_twice_as_loose() {
+    let found = [true, false].map(|noisy| {
+        let Truth { mut cell, x, y } = made(6, (&[Body::Flange], &[Body::Base]), 8, 1e-3, false);
+        for m in &mut cell.measurements {
+            if noisy {
+                m.variance_px2 = 4.0;
+                m.pose.camera_information *= 4.0;
+                m.pose.camera_gradient *= 4.0;
+            } else {
+                m.pose.covariance *= 4.0;
+            }
+        }
+        estimate(&cell, (x, y), &options(false)).unwrap()
+    });
+    let [noisy, loose] = &found;
+    assert!((&noisy.covariance - &loose.covariance).amax() < 1e-9 * loose.covariance.amax());
+}
