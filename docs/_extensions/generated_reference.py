@@ -1,6 +1,6 @@
 """Write the reference pages from what the code says of itself: docstrings, the core's stub, `--help`.
 
-The pages are made anew with every build, into `docs/reference`, and are not under version control.
+The pages are made with every build, into `docs/reference`, and are not under version control.
 """
 
 import ast

@@ -81,7 +81,7 @@ def test_samples_of_easy_handeye2(tmp_path: Path, handeye: Handeye) -> None:
 
 
 def test_a_bag_beside_its_board(tmp_path: Path, handeye: Handeye) -> None:
-    pytest.importorskip("rosbags")
+    pytest.importorskip("rosbags", reason="rosbags, which writes the bags, is not installed")
     journey = Journey(seed=7, stations=5, picture_hz=6)
     bag = write(tmp_path / "cell", "rosbag1", journey)
     (tmp_path / "board.toml").write_text(toml_text({"target": journey.target.to_dict()}))

@@ -19,8 +19,8 @@ from handeye.importing import BagOptions, Opened, SourceOptions, open_folder
 from handeye.robots import open_arm
 from handeye.types import Mounting
 
-pytest.importorskip("rosbags")
-pytest.importorskip("lz4")
+pytest.importorskip("rosbags", reason="rosbags, which writes the bags, is not installed")
+pytest.importorskip("lz4", reason="lz4 is not installed (extra bags)")
 Write = Callable[..., Path]
 
 

@@ -10,7 +10,7 @@ from handeye.datasets.bags import is_bag, read_contents
 from handeye.errors import InputError
 from handeye.types import Pose
 
-pytest.importorskip("rosbags")
+pytest.importorskip("rosbags", reason="rosbags, which writes the bags, is not installed")
 ROUNDS = 120
 
 
