@@ -50,6 +50,23 @@ impl<V: Vector> DistortedPoint<V> {
 }
 
 impl DistortedPoint<f64> {
+    /// A point that the lens moves along its radius, by a scale of slope `2 d scale / d r^2`.
+    #[inline]
+    pub fn along_radius(x: f64, y: f64, scale: f64, slope: f64) -> Self {
+        let cross = slope * x * y;
+        Self {
+            x: x * scale,
+            y: y * scale,
+            along_x: scale + slope * x * x,
+            cross_x: cross,
+            cross_y: cross,
+            along_y: scale + slope * y * y,
+            squared_radius: x * x + y * y,
+            radial: scale,
+            inverse_denominator: 1.0,
+        }
+    }
+
     /// `[[dx'/dx, dx'/dy], [dy'/dx, dy'/dy]]`.
     #[inline]
     pub fn jacobian(&self) -> Matrix2<f64> {

@@ -23,18 +23,7 @@ fn distort(p: &Parameters, x: f64, y: f64) -> DistortedPoint<f64> {
     let scale = 2.0 / (1.0 + root);
     // Twice the derivative of the scale in s.
     let slope = 2.0 * p[4] * scale * scale / root;
-    let cross = slope * x * y;
-    DistortedPoint {
-        x: x * scale,
-        y: y * scale,
-        along_x: scale + slope * x * x,
-        cross_x: cross,
-        cross_y: cross,
-        along_y: scale + slope * y * y,
-        squared_radius: s,
-        radial: scale,
-        inverse_denominator: 1.0,
-    }
+    DistortedPoint::along_radius(x, y, scale, slope)
 }
 
 fn differentiate(

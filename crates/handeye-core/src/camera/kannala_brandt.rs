@@ -43,18 +43,7 @@ fn distort(p: &Parameters, x: f64, y: f64) -> DistortedPoint<f64> {
         let scale = angle / r;
         (scale, (rate / (1.0 + s) - scale) / s)
     };
-    let cross = slope * x * y;
-    DistortedPoint {
-        x: x * scale,
-        y: y * scale,
-        along_x: scale + slope * x * x,
-        cross_x: cross,
-        cross_y: cross,
-        along_y: scale + slope * y * y,
-        squared_radius: s,
-        radial: scale,
-        inverse_denominator: 1.0,
-    }
+    DistortedPoint::along_radius(x, y, scale, slope)
 }
 
 /// Derivative of the point after the lens in `k1..k4`: columns 4 to 7 of `out`.
