@@ -119,6 +119,7 @@ impl Component for Posture {
                 prior: LevelPrior::Deviation {
                     size: self.beliefs.size_deg * degree,
                     exponent: self.beliefs.exponent,
+                    tail: 2.0,
                     nothing: 1e-6 * degree,
                 },
             },
