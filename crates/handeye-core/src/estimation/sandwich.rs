@@ -35,7 +35,7 @@ impl Mixed {
         let n = self.size;
         let (whitened, _) = self.whitened(noise, Some(prior))?;
         let rows = &whitened.rows;
-        dispatch(self.unit, Accumulate { rows, width: self.width, size: p, sum: &mut sum });
+        dispatch(self.unit, Accumulate::pairs(rows, self.width, p, &mut sum));
         // What the recurring errors of each station do to the answer, a row for each of them.
         let mut by_station = vec![0.0; self.stations.len() * recurring * narrow];
         let mut here = vec![0.0; tall * self.width];
@@ -45,7 +45,7 @@ impl Mixed {
             let end = first + station.size * self.width;
             here.fill(0.0);
             let rows = &whitened.rows[first..end];
-            dispatch(self.unit, Accumulate { rows, width: self.width, size: p, sum: &mut here });
+            dispatch(self.unit, Accumulate::pairs(rows, self.width, p, &mut here));
             first = end;
             for ((j, scale), row) in scales.iter().enumerate().zip(by_station.chunks_exact_mut(narrow)) {
                 for (i, entry) in row[..p].iter_mut().enumerate() {
@@ -54,7 +54,7 @@ impl Mixed {
                 }
             }
         }
-        dispatch(self.unit, Accumulate { rows: &by_station, width: narrow, size: p, sum: &mut own });
+        dispatch(self.unit, Accumulate::pairs(&by_station, narrow, p, &mut own));
         for i in 0..p {
             right[i] -= sum[i * self.width + n];
             for j in i..p {
