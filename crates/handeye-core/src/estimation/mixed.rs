@@ -46,7 +46,7 @@ impl Prior {
 }
 
 /// Adds a multiple of a matrix of the same shape.
-fn add(to: &mut DMatrix<f64>, factor: f64, m: &DMatrix<f64>) {
+pub(super) fn add(to: &mut DMatrix<f64>, factor: f64, m: &DMatrix<f64>) {
     for (to, m) in to.as_mut_slice().iter_mut().zip(m.as_slice()) {
         *to += factor * m;
     }
