@@ -56,7 +56,7 @@ def examine_pictures(measurements: Measurements, *, closely: bool = False) -> tu
         return ()
     found = None if measurements.camera.from_views else recalibrated(measurements)
     after = before if found is None else found.after_px
-    if after > HEALTHY_PX:  # No camera explains them.
+    if after > HEALTHY_PX or closely:  # No camera explains them, or none that robot and images agree with.
         shear, left = sheared_pictures.find_shear(measurements)
         if left < SHEAR_SHARE * after and abs(shear) > LEAST_SHEAR:
             raise _sheared(before, shear, left)
