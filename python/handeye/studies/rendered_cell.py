@@ -237,9 +237,8 @@ def _start(one: CellCamera, pictures: MujocoPictures, arm: str, number: int, see
         start, left = draw_start(pool, random)
         views = [view for view in map(measured, start) if view is not None]
     estimator = make_estimator(ModelName.AUTO, ArmKinematics(robot), camera_fixed=True)
-    planner = Planner(
-        empty.with_views(views), left, estimator, PlannerOptions(sight=Sight(margin_px=MARGIN_PX))
-    )
+    options = PlannerOptions(criterion=_core.Criterion("accuracy"), sight=Sight(margin_px=MARGIN_PX))
+    planner = Planner(empty.with_views(views), left, estimator, options)
     while len(planner.measurements) < VIEWS:
         answer = planner.ask()
         if not isinstance(answer, Proposal):

@@ -1,5 +1,6 @@
 //! What a view is worth: one file per criterion over one small base.
 
+mod accuracy;
 mod eigenvalue_sum;
 mod entropy;
 mod entropy_hand_eye;
@@ -10,6 +11,7 @@ mod trace;
 
 use nalgebra::{DMatrix, Matrix6};
 
+pub use accuracy::Accuracy;
 pub use eigenvalue_sum::EigenvalueSum;
 pub use entropy::Entropy;
 pub use entropy_hand_eye::EntropyHandEye;
