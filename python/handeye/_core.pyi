@@ -332,9 +332,8 @@ class Belief:
     def hand_eye_entropy(self) -> float: ...
 
 class Criterion:
-    """Worth of a view.
+    """Worth of a view: entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue, tool_point or task.
 
-    `name`: accuracy, entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue, tool_point or task.
     `tasks` (P, d, n): rows over all parameters. A view is worth what it takes off the root mean square of the
     tasks' summed variances.
     """

@@ -3,8 +3,7 @@
 use crate::call::CallCore;
 use handeye_core::error::Error;
 use handeye_core::information::criteria::{
-    Accuracy, Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, Task,
-    ToolPoint, Trace,
+    Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, Scales, Task, ToolPoint, Trace,
 };
 use handeye_core::information::{
     ArmColumns, Belief as CoreBelief, CandidateModel, Execution, Motions, RobotError, Visibility,
@@ -90,7 +89,6 @@ impl PyCriterion {
             return Err(invalid(py, "length and angle scales must be positive"));
         }
         let inner: Box<dyn Criterion + Send + Sync> = match name {
-            "accuracy" => Box::new(Accuracy),
             "entropy" => Box::new(Entropy),
             "entropy_handeye" => Box::new(EntropyHandEye),
             "trace" => Box::new(Trace { scales }),
@@ -122,8 +120,8 @@ impl PyCriterion {
                 return Err(invalid(
                     py,
                     &format!(
-                        "unknown criterion \"{other}\"; there are accuracy, entropy, entropy_handeye, \
-                         trace, eigenvalue_sum, min_eigenvalue, tool_point, task"
+                        "unknown criterion \"{other}\"; there are entropy, entropy_handeye, trace, \
+                         eigenvalue_sum, min_eigenvalue, tool_point, task"
                     ),
                 ));
             }

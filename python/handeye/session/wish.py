@@ -6,7 +6,6 @@ from handeye import _core
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Measurements
 from handeye.estimation.work import Work
-from handeye.planning.criteria import usual_criterion
 from handeye.planning.policies import Policy
 from handeye.planning.policies.next_best_view import NextBestView
 from handeye.planning.stopping import NumberOfViews, StopRule
@@ -84,5 +83,5 @@ class Wish:
     def criterion(self, estimate: Estimate, measurements: Measurements) -> _core.Criterion:
         """Return what a view is worth now: what it takes off the touch error, where that is asked for."""
         if self.touch_mm is None or not estimate.determined:
-            return usual_criterion(estimate, camera_too=self.accuracy_px is not None)
+            return _core.Criterion("entropy")
         return touch_criterion(estimate, measurements, self.work)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from handeye import _core
-from handeye.estimation import Estimator, Measurements, make_estimator
+from handeye.estimation import Estimate, Estimator, Measurements, make_estimator
 from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Proposal, make_policy
 from handeye.planning.batch import plan_batch
 from handeye.planning.collisions import Workspace
@@ -81,11 +81,20 @@ def planned(
     return taken
 
 
-def driven(policy: str, course: Course) -> list[Candidate]:
+class _OfHandEye(Wish):
+    """A request whose views are worth what they tell of the hand-eye alone."""
+
+    def criterion(self, estimate: Estimate, measurements: Measurements) -> _core.Criterion:
+        """Return the entropy of X, everything else marginalised."""
+        del estimate, measurements
+        return _core.Criterion("entropy_handeye")
+
+
+def driven(policy: str, wishes: type[Wish], course: Course) -> list[Candidate]:
     """Drive as `handeye run` does: candidates are drawn for every view, and the best are climbed from."""
     cell, last = course.cell, course.start[-1]
     seed = int(course.random.integers(2**31))
-    wish = Wish(accuracy_mm=None, accuracy_deg=None, seed=seed, policy=make_policy(policy))
+    wish = wishes(accuracy_mm=None, accuracy_deg=None, seed=seed, policy=make_policy(policy))
     standing = Start(last.T_base_flange, last.joints_rad or ())
     chooser = ArmChooser(simulated_arm(), EMPTY, cell.recording.camera, standing, wish)
     estimator = course.estimator()
@@ -148,33 +157,28 @@ def _lattice(name: str, course: Course, most: int | None) -> list[Candidate]:
 # The row that is ours: what `handeye run` does.
 OURS = "handeye_run"
 
-POLICY_ROWS: dict[str, PolicyRow] = {
-    OURS: partial(driven, "next_best_view"),
-    "next_best_view": partial(planned, "next_best_view", "accuracy", ModelName.AUTO, None),
+# Rows of this package's model and criteria; the others are what the field does.
+OF_OURS: dict[str, PolicyRow] = {
+    OURS: partial(driven, "next_best_view", Wish),
+    "handeye_run, hand-eye entropy": partial(driven, "next_best_view", _OfHandEye),
+    "next_best_view": partial(planned, "next_best_view", "entropy", ModelName.AUTO, None),
     "next_best_view, hand-eye entropy": partial(
         planned, "next_best_view", "entropy_handeye", ModelName.AUTO, None
     ),
-    "next_best_view, entropy": partial(planned, "next_best_view", "entropy", ModelName.AUTO, None),
     "batch": partial(together, "entropy"),
     "batch, hand-eye entropy": partial(together, "entropy_handeye"),
+}
+
+POLICY_ROWS: dict[str, PolicyRow] = {
+    **OF_OURS,
     "next_best_view, paper's model": partial(planned, "next_best_view", "entropy", ModelName.PAPER, None),
     "max_distance": partial(planned, "max_distance", "entropy", ModelName.PAPER, None),
-    "max_distance, driven": partial(driven, "max_distance"),
+    "max_distance, driven": partial(driven, "max_distance", Wish),
     "random": partial(planned, "random", "entropy", ModelName.PAPER, None),
-    "random, driven": partial(driven, "random"),
+    "random, driven": partial(driven, "random", Wish),
     "sentiac_44": partial(planned, "next_best_view", "entropy", ModelName.PAPER, "sentiac_44"),
     **{name: partial(lattice, name) for name in ("easy_handeye_17", "serpentine", "human")},
 }
-
-# Rows of this package's model and criteria; the others are what the field does.
-OF_OURS = (
-    OURS,
-    "next_best_view",
-    "next_best_view, hand-eye entropy",
-    "next_best_view, entropy",
-    "batch",
-    "batch, hand-eye entropy",
-)
 
 # Rows that choose all their views together; the others choose one after another.
 AT_ONCE = ("batch", "batch, hand-eye entropy", "easy_handeye_17", "serpentine", "human")

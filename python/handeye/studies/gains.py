@@ -24,7 +24,7 @@ from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
 from handeye.validation import metrics
 
-CRITERIA = ("accuracy", "entropy_handeye", "entropy")
+CRITERIA = ("entropy", "entropy_handeye")
 CANDIDATES, DRAWS, HELD_OUT = 25, 50, 20
 QUANTITIES = ("log_translation", "log_rotation", "log_error", "rmse_px")
 # First number of the steps that are held out: their noise is that of no other view.

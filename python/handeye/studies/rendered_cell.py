@@ -237,8 +237,9 @@ def _start(one: CellCamera, pictures: MujocoPictures, arm: str, number: int, see
         start, left = draw_start(pool, random)
         views = [view for view in map(measured, start) if view is not None]
     estimator = make_estimator(ModelName.AUTO, ArmKinematics(robot), camera_fixed=True)
-    options = PlannerOptions(criterion=_core.Criterion("accuracy"), sight=Sight(margin_px=MARGIN_PX))
-    planner = Planner(empty.with_views(views), left, estimator, options)
+    planner = Planner(
+        empty.with_views(views), left, estimator, PlannerOptions(sight=Sight(margin_px=MARGIN_PX))
+    )
     while len(planner.measurements) < VIEWS:
         answer = planner.ask()
         if not isinstance(answer, Proposal):

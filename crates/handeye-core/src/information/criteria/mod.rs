@@ -1,6 +1,5 @@
 //! What a view is worth: one file per criterion over one small base.
 
-mod accuracy;
 mod eigenvalue_sum;
 mod entropy;
 mod entropy_hand_eye;
@@ -11,7 +10,6 @@ mod trace;
 
 use nalgebra::{DMatrix, Matrix6};
 
-pub use accuracy::Accuracy;
 pub use eigenvalue_sum::EigenvalueSum;
 pub use entropy::Entropy;
 pub use entropy_hand_eye::EntropyHandEye;

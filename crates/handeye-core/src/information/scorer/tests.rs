@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use crate::camera::{Camera, Feature, Lens};
 use crate::information::criteria::{
-    Accuracy, Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, ToolPoint, Trace,
+    Criterion, EigenvalueSum, Entropy, EntropyHandEye, MinEigenvalue, Over, ToolPoint, Trace,
 };
 use crate::information::{ArmColumns, Belief, CandidateModel, Execution, Motions, RobotError, Visibility};
 use crate::least_squares::PixelParameters;
@@ -228,7 +228,6 @@ fn criteria() -> Vec<Box<dyn Criterion>> {
         Box::new(EntropyHandEye),
         Box::new(Trace::default()),
         Box::new(EigenvalueSum::default()),
-        Box::new(Accuracy),
         Box::new(MinEigenvalue::default()),
         Box::new(ToolPoint::new(&[Vector3::new(0.0, 0.1, 0.6)], Over::Mean).unwrap()),
     ]
