@@ -8,7 +8,6 @@ import numpy as np
 
 from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
-from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.page import Page, serve, show_views
@@ -70,8 +69,6 @@ def solve(
     """
     check_output(output)
     if source.only is None and is_rig(folder):
-        if certify:
-            raise UsageError("--certify takes one camera", hint="leave it out for several")
         rig = source.open_rig(folder)
         views = [station.views[0].view for station in rig.recording.stations]
         return answer_for_rig(
@@ -81,6 +78,7 @@ def solve(
             reduced=reduced,
             kinematics=arm.kinematics(views, model),
             camera_fixed=camera_fixed,
+            certify=certify,
             page=page,
             arm=arm,
         )
