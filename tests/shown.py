@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -88,16 +89,16 @@ def run(command: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     )
 
 
-def run_page(markdown: str, folder: Path, example: Path) -> None:
+def run_page(markdown: str, folder: Path, written: Mapping[str, Path]) -> None:
     """Run the commands of a page one after the other; what is shown must be printed, with about these numbers.
 
-    `example` is what ``handeye demo --folder my_folder`` has written once for all pages that begin with it.
+    `written` are folders for commands of which tests elsewhere show that they write such ones.
     """
     for step in steps(markdown):
         if SERVED.search(step.command):
             continue
-        if step.command == "handeye demo --folder my_folder" and not step.output:
-            shutil.copytree(example, folder / "my_folder", dirs_exist_ok=True)
+        if step.command in written and not step.output:
+            shutil.copytree(written[step.command], folder / step.command.split()[-1])
             continue
         ran = run(step.command, folder)
         expected = 3 if step.output.startswith("error:") else 0

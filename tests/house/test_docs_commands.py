@@ -10,8 +10,11 @@ import pytest
 
 import shown
 from handeye.cli.app import make_app
+from handeye.datasets import write_rig
 from handeye.datasets.shipped import shipped_recording
 from handeye.simulation.cells import CellOptions, ErrorKind, simulate, simulated_arm
+from handeye.simulation.example_folder import write_example
+from handeye.simulation.rigs import simulate_rig
 from handeye.types import Pose
 
 PAGES = {path.relative_to(shown.DOCS).as_posix(): path.read_text() for path in shown.pages()}
@@ -23,10 +26,12 @@ UNRUN = [(name, line) for name, text in PAGES.items() for line in shown.unrun(te
 
 
 @pytest.fixture(scope="session")
-def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("example")
-    assert shown.run("handeye demo --folder my_folder", folder).returncode == 0
-    return folder / "my_folder"
+def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Folders that many pages begin with."""
+    folder = tmp_path_factory.mktemp("written")
+    write_example(folder / "my_folder", 0)
+    write_rig(simulate_rig(ErrorKind.WHITE_FLANGE, 2), folder / "my_rig")
+    return {f"handeye demo --{kind} my_{kind}": folder / f"my_{kind}" for kind in ("folder", "rig")}
 
 
 def test_blocks_are_understood() -> None:
@@ -44,11 +49,12 @@ def test_blocks_are_understood() -> None:
 
 
 @pytest.mark.parametrize("name", WITH_COMMANDS)
-def test_commands_run_and_print_what_is_shown(name: str, tmp_path: Path, example: Path) -> None:
-    shutil.copytree(shipped_recording(), tmp_path / "recording")
-    poses = "name,x,y,z,qx,qy,qz,qw\nleft_high,0.412,-0.120,0.655,0.0,0.9659258,0.0,0.2588190\n"
-    (tmp_path / "poses.csv").write_text(poses)
-    shown.run_page(PAGES[name], tmp_path, example)
+def test_commands_run_and_print_what_is_shown(name: str, tmp_path: Path, written: dict[str, Path]) -> None:
+    if name.startswith("commands/"):
+        shutil.copytree(shipped_recording(), tmp_path / "recording")
+        poses = "name,x,y,z,qx,qy,qz,qw\nleft_high,0.412,-0.120,0.655,0.0,0.9659258,0.0,0.2588190\n"
+        (tmp_path / "poses.csv").write_text(poses)
+    shown.run_page(PAGES[name], tmp_path, written)
 
 
 @pytest.mark.parametrize(("name", "line"), UNRUN)
