@@ -6,6 +6,7 @@ or have its base turned by half a turn. Both are constant transforms, found from
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class ArmKinematics:
             return -_seen_from(self.T_tip_flange.inverse(), self.arm.jacobian(joints, "flange"))
         return _seen_from(self.T_base_root, self.arm.jacobian(joints, "base"))
 
-    @property
+    @cached_property
     def link_twists(self) -> FloatArray:
         """(n, 6, m) twist of each joint on the link before it, per way of displacing it.
 
@@ -97,7 +98,9 @@ class ArmKinematics:
                     way = np.zeros((count, 6))
                     way[i, first : first + 3] = direction
                     ways.append(way)
-        return np.moveaxis(np.array(ways).reshape(-1, count, 6), 0, 2)
+        twists = np.moveaxis(np.array(ways).reshape(-1, count, 6), 0, 2)
+        twists.flags.writeable = False
+        return twists
 
     def link_jacobians(self, mounting: Mounting, joints: FloatArray) -> FloatArray:
         """(K, 6, m) L at joint positions (K, n): truly ``A = exp(L l) A_reported``, l metres and radians."""

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-import cv2
 import numpy as np
 
 from handeye.cameras.protocol import BAD_FRAME, Frame, Grey, ImageSource, checked_frame
@@ -329,9 +328,3 @@ def _look(
 
 def _digest(content: bytes) -> str:
     return hashlib.blake2b(content, digest_size=16).hexdigest()
-
-
-def encoded(image: Grey) -> bytes:
-    """Return an image as PNG."""
-    _, data = cv2.imencode(".png", image)
-    return data.tobytes()

@@ -4,10 +4,11 @@ import time
 from dataclasses import replace
 from functools import partial
 
+from handeye.datasets.png_writing import png_bytes
 from handeye.detection import Detection
 from handeye.errors import HandeyeError, OutputError, printable
 from handeye.estimation import Estimate, view_pose
-from handeye.session.attempt import Cell, Missed, Seen, attempt, encoded
+from handeye.session.attempt import Cell, Missed, Seen, attempt
 from handeye.session.deciding import Step
 from handeye.session.entry import Entry, Failure
 from handeye.session.judging import foreseen, labeled, objection, unchanged
@@ -64,7 +65,7 @@ class Taker:
             entry = replace(
                 entry, view=view, detail=seen.note, image_digest=seen.digest, standing_rad=standing
             )
-            image = None if seen.image is None else encoded(seen.image)
+            image = None if seen.image is None else png_bytes(seen.image)
         self._write(entry, image)
         return entry
 
