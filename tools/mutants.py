@@ -84,7 +84,7 @@ MUTANTS = (
     Mutant("stop works before the first motion", "session/contract.py", '    if why is not None:\n        raise DeviceError(\n            f"the robot cannot be stopped', '    if False:\n        raise DeviceError(\n            f"the robot cannot be stopped', T_SAFETY),
     Mutant("rest before the first motion", "session/contract.py", "if not is_near(first.T_base_flange, second.T_base_flange, REST_M, REST_RAD):\n        raise", "if False:\n        raise", T_SAFETY),
     Mutant("stop after a failure", ATTEMPT, "    if not refused:\n        stopped = cell.stop()", "    if False:\n        stopped = cell.stop()", T_SAFETY),
-    Mutant("read again after a failure", ATTEMPT, "        cell.robot_calls.wait(cell.patience.move_s)\n        after = cell.read()", "        cell.robot_calls.wait(cell.patience.move_s)\n        after = before", T_SAFETY),
+    Mutant("read again after a failure", ATTEMPT, "        cell.robot_calls.wait(cell.timeouts.move_s)\n        after = cell.read()", "        cell.robot_calls.wait(cell.timeouts.move_s)\n        after = before", T_SAFETY),
     Mutant("a robot that does not move", ATTEMPT, "before.T_base_flange, after.T_base_flange, STILL_M, STILL_RAD\n    ):", "before.T_base_flange, after.T_base_flange, STILL_M, STILL_RAD\n    ) and False:", T_SAFETY),
     Mutant("workspace of the pose read back", ATTEMPT, 'return "outside the workspace"', "return None", T_SAFETY),
     Mutant("posture read back", ATTEMPT, "return body.obstacles(np.array(reading.joints_rad)[np.newaxis])[0]", "return None", T_SAFETY),

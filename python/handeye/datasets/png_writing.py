@@ -30,7 +30,7 @@ def png_bytes(grey: NDArray[np.uint8]) -> bytes:
     lines = np.zeros((height, width + 1), np.uint8)  # each begins with its filter: none
     lines[:, 1:] = grey
     header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    chunks = (b"IHDR", header), (b"IDAT", zlib.compress(lines, level=0)), (b"IEND", b"")
+    chunks = (b"IHDR", header), (b"IDAT", zlib.compress(lines.tobytes(), level=0)), (b"IEND", b"")
     return _SIGNATURE + b"".join(
         part
         for kind, content in chunks

@@ -69,7 +69,7 @@ def _rays(camera: Camera) -> FloatArray:
 def _without_turn(off: FloatArray, camera: Camera, rays: FloatArray) -> FloatArray:
     """Return pixel differences (2 N, n) without what a small turn of the camera explains."""
     _, in_points, _, _ = _core.project_jacobians(camera.lens, camera.parameters, rays)
-    turns = np.einsum("kij,akj->kia", in_points, np.cross(np.eye(3)[:, np.newaxis], rays))
-    turns = turns.reshape(2 * len(rays), 3)
+    turned: FloatArray = np.einsum("kij,akj->kia", in_points, np.cross(np.eye(3)[:, np.newaxis], rays))
+    turns = turned.reshape(2 * len(rays), 3)
     explained, *_ = np.linalg.lstsq(turns, off, rcond=None)
     return off - turns @ explained

@@ -1,5 +1,6 @@
 """What makes a posture usable as a view: distance, tilt, sight, and room for the arm there and on the way."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -109,13 +110,15 @@ class ViewConstraints:
         left = np.arange(len(joints))
         turned_down: dict[int, str] = {}
         # Each is asked only of what the ones before it let through; the costly ones come last.
-        standing = [lambda left: self.body.obstacles(joints[left])] if body else []
-        for reasons in (
+        questions: list[Callable[[IndexArray], list[str | None]]] = [
             lambda left: self._bad_views(at[left]),
             lambda left: self._hidden(at[left]),
-            *standing,
+            lambda left: self.body.obstacles(joints[left]),
             lambda left: self._failed_before(joints[left]),
-        ):
+        ]
+        if not body:
+            del questions[2]
+        for reasons in questions:
             why = reasons(left)
             turned_down |= {
                 int(index): reason for index, reason in zip(left, why, strict=True) if reason is not None

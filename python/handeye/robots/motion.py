@@ -81,13 +81,17 @@ class ArmKinematics:
             return -_seen_from(self.T_tip_flange.inverse(), self.arm.jacobian(joints, "flange"))
         return _seen_from(self.T_base_root, self.arm.jacobian(joints, "base"))
 
-    @cached_property
+    @property
     def link_twists(self) -> FloatArray:
         """(n, 6, m) twist of each joint on the link before it, per way of displacing it.
 
         Where the first joint sits says where the base is, and the place and angle of the last along its own
         axis where the flange is: matters of names, and left out.
         """
+        return self._link_twists
+
+    @cached_property
+    def _link_twists(self) -> FloatArray:
         count = len(self.arm)
         ways: list[FloatArray] = []
         for i in range(1, count):

@@ -122,7 +122,7 @@ class Taker:
 
     def _write(self, entry: Entry, image: bytes | None) -> None:
         """Write an attempt down; where the disk refuses, wait and ask again before giving up."""
-        for patience in (1, 2, 0):
+        for pauses in (1, 2, 0):
             try:
                 if len(self._store.entries) >= entry.number:  # written, but the recording lagged behind
                     return
@@ -131,6 +131,6 @@ class Taker:
                 self._store.append(entry)
                 return
             except OutputError:
-                if patience == 0:
+                if pauses == 0:
                     raise
-                time.sleep(patience * _WRITE_PAUSE_S)
+                time.sleep(pauses * _WRITE_PAUSE_S)
