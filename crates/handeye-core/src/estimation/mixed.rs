@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::component::Component;
 pub(super) use super::component::{Effect, Term};
-use super::levels::Level;
+use super::levels::{Level, LevelPrior};
 use super::linearisation::Linearisation;
 use super::products::{Accumulate, TOGETHER, Whiten};
 use crate::positive::Factor;
@@ -291,6 +291,15 @@ impl Mixed {
     /// Logarithms of the levels to begin with.
     pub fn start(&self) -> DVector<f64> {
         DVector::from_iterator(self.levels.len(), self.levels.iter().map(|l| l.start.ln()))
+    }
+
+    /// The same where every error is as large as is usual at most.
+    pub fn large_start(&self) -> DVector<f64> {
+        let large = |l: &Level| match l.prior {
+            LevelPrior::Deviation { size, .. } => size.ln(),
+            LevelPrior::Ratio { .. } => l.start.ln(),
+        };
+        DVector::from_iterator(self.levels.len(), self.levels.iter().map(large))
     }
 
     pub fn deviation(levels: &[usize], t: &DVector<f64>) -> f64 {
