@@ -64,7 +64,7 @@ MUTANTS = (
     Mutant("lower limits", "planning/collisions.py", "(joints < low_limit) | (joints > high_limit)", "(joints > high_limit)", T_SAFETY),
     Mutant("floor", "planning/collisions.py", "low = np.any(frames[:, 3:, 2, 3]", "low = 0 * np.any(frames[:, 3:, 2, 3]", T_COLLISIONS),
     Mutant("workspace of the tool", "planning/collisions.py", "ends = np.concatenate([frames[:, -1:, :3, 3], tools], axis=1)", "ends = frames[:, -1:, :3, 3]", T_SAFETY),
-    Mutant("touching itself", "planning/collisions.py", "touching[left] = self._touches_itself(frames[left], tools[left])", "pass", T_COLLISIONS),
+    Mutant("touching itself", "planning/collisions.py", "touching[left] = self._touches_itself(", "touching[left] = False & self._touches_itself(", T_COLLISIONS),
     Mutant("the way, not its end alone", "planning/collisions.py", "why = self.obstacles(np.concatenate([path[1:] for path in paths]))", "why = self.obstacles(np.concatenate([np.tile(path[-1:], (len(path) - 1, 1)) for path in paths]))", T_COLLISIONS),
     Mutant("where the arm stands, in decisions", CHOOSING, "if entry.standing_rad is not None:\n                return entry.standing_rad", "if False:\n                return ()", T_SAFETY),
     Mutant("paths from the posture of the start", CHOOSING, "        for entry in reversed(situation.entries):\n            if entry.standing_rad", "        for entry in ():\n            if entry.standing_rad", T_SAFETY),
