@@ -46,7 +46,7 @@ def test_a_start_has_a_transform_for_each_camera_and_target() -> None:
     poses, one = measurements.motions, np.eye(4)[np.newaxis]
     measured = [(0, 0, seen, [0, 1, 2, 3], [1.0] * 4)]
     for start in ((one[:0], one[:0]), (one, one[:0]), (one[:0], one), (np.tile(one, (2, 1, 1)), one)):
-        with pytest.raises(InputError, match="a start of .* expected 1 and 1"):
+        with pytest.raises(InputError, match=r"a start of .* expected 1 and 1"):
             _core.estimate_cell(
                 poses, [(True, 0, False, None)], [False], measured, start=start, pairs=2, most_rounds=2
             )
