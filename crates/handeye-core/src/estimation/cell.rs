@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Vector6};
 
 use super::pose_measurement::PoseMeasurement;
+use super::touched::{self, Tip, Touch};
 use crate::error::Error;
 use crate::se3::Se3;
 
@@ -51,6 +52,9 @@ pub struct Station {
     pub velocity: Option<Vector6<f64>>,
     /// Twist per way of displacing a joint on its link, `6 x m`.
     pub links: Option<DMatrix<f64>>,
+    /// Twist per joint and its play, `6 x n`: half of it towards the side that the joint came from. `None` where that
+    /// is not known, or the joints have no play.
+    pub approach: Option<DMatrix<f64>>,
 }
 
 /// One detection of a target in a picture.
@@ -82,10 +86,15 @@ pub struct Cell {
     pub board_scale: bool,
     /// Detections, by station.
     pub measurements: Vec<Measurement>,
+    /// Points that touches are about beside those of the targets.
+    pub tips: Vec<Tip>,
+    /// Points that met, by station.
+    pub touches: Vec<Touch>,
 }
 
 impl Cell {
-    /// Columns of the parameters: first those of `X` and `Y`, then of the cameras, then scales of the boards.
+    /// Columns of the parameters: first those of `X` and `Y`, then of the cameras, then scales of the boards,
+    /// then tips.
     pub(super) fn columns(&self) -> Columns {
         let poses = 6 * (self.cameras.len() + self.targets.len());
         let mut camera = Vec::with_capacity(self.cameras.len());
@@ -95,12 +104,8 @@ impl Cell {
             next += one.parameters;
         }
         let boards = next;
-        Columns {
-            targets: 6 * self.cameras.len(),
-            camera,
-            boards,
-            end: boards + if self.board_scale { self.targets.len() } else { 0 },
-        }
+        let tips = boards + if self.board_scale { self.targets.len() } else { 0 };
+        Columns { targets: 6 * self.cameras.len(), camera, boards, tips, end: tips + 3 * self.tips.len() }
     }
 
     /// The middle `M` of the chain `X M Y` at a station.
@@ -152,7 +157,7 @@ impl Cell {
                 return Err(Error::invalid(format!("camera {c}: its prior is not of its parameters")));
             }
         }
-        Ok(())
+        touched::check(self)
     }
 }
 
@@ -165,6 +170,8 @@ pub(super) struct Columns {
     pub camera: Vec<usize>,
     /// First of the scales of the boards.
     pub boards: usize,
+    /// First of the tips.
+    pub tips: usize,
     /// One beyond the last.
     pub end: usize,
 }

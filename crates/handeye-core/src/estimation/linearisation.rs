@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::cell::{Body, Cell};
+use super::touched;
 use crate::se3::Se3;
 
 /// The unknown poses.
@@ -26,7 +27,7 @@ impl Guess {
     }
 }
 
-/// One station linearised: six rows per measurement.
+/// One station linearised: six rows per measurement, or three of a touch.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     /// Which station of the cell.
@@ -46,9 +47,9 @@ pub(super) struct Rows {
 /// All stations.
 #[derive(Clone, Debug)]
 pub(super) struct Linearisation {
-    /// Stations with a measurement.
+    /// Stations with a measurement or a touch.
     pub stations: Vec<Rows>,
-    /// What the pixels say of the parameters beside the poses: information and gradient.
+    /// What the pixels say of the parameters beside the poses, and what is known of tips: information and gradient.
     pub information: DMatrix<f64>,
     /// See `information`.
     pub gradient: DVector<f64>,
@@ -108,6 +109,11 @@ pub(super) fn linearise(cell: &Cell, guess: &Guess) -> Linearisation {
             }
         }
         stations.push(rows);
+    }
+    stations.extend(cell.touches.iter().map(|touch| touched::rows(cell, guess, &columns, touch)));
+    for (i, tip) in cell.tips.iter().enumerate() {
+        let mut known = information.view_mut((columns.tips + 3 * i, columns.tips + 3 * i), (3, 3));
+        known += &tip.information;
     }
     Linearisation { stations, information, gradient }
 }

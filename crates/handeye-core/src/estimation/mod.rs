@@ -29,6 +29,7 @@ mod sandwich;
 mod slopes;
 mod start;
 mod systems;
+mod touched;
 mod twists;
 mod weak_prior;
 
@@ -44,4 +45,5 @@ pub use pixel_field::{SlowResiduals, shared_error};
 pub use pose_measurement::{PoseMeasurement, compress, relative_weights, shrunk_variances};
 pub use posterior::{Attribution, Node, Options, Posterior, estimate};
 pub use start::{ChainStart, start_from_poses};
+pub use touched::{Tip, Touch, TouchPoint};
 pub use weak_prior::WeakPrior;

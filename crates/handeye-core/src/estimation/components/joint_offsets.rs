@@ -11,11 +11,12 @@ use crate::estimation::mixed::{Effect, Term};
 /// Offsets of the joints between the first and the last, which only say where base and flange are.
 pub(in crate::estimation) struct JointOffsets {
     offsets: Vec<DMatrix<f64>>,
+    roughness: f64,
 }
 
 impl JointOffsets {
-    pub(in crate::estimation) fn new(arm: &Arm) -> Self {
-        Self { offsets: arm.offsets.clone() }
+    pub(in crate::estimation) fn new(arm: &Arm, roughness: f64) -> Self {
+        Self { offsets: arm.offsets.clone(), roughness }
     }
 }
 
@@ -28,8 +29,12 @@ impl Component for JointOffsets {
         let degree = 1_f64.to_radians();
         vec![Level {
             name: "offset_rad",
-            start: 0.01 * degree,
-            prior: LevelPrior::Deviation { size: 0.05 * degree, exponent: 0.25, nothing: 1e-4 * degree },
+            start: 0.01 * degree * self.roughness,
+            prior: LevelPrior::Deviation {
+                size: 0.05 * degree * self.roughness,
+                exponent: 0.25,
+                nothing: 1e-4 * degree,
+            },
         }]
     }
 

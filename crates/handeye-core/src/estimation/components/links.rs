@@ -12,11 +12,12 @@ use crate::estimation::mixed::{Effect, Term};
 pub(in crate::estimation) struct Links {
     lengths: Vec<DMatrix<f64>>,
     angles: Vec<DMatrix<f64>>,
+    roughness: f64,
 }
 
 impl Links {
-    pub(in crate::estimation) fn new(arm: &Arm) -> Self {
-        Self { lengths: arm.lengths.clone(), angles: arm.angles.clone() }
+    pub(in crate::estimation) fn new(arm: &Arm, roughness: f64) -> Self {
+        Self { lengths: arm.lengths.clone(), angles: arm.angles.clone(), roughness }
     }
 }
 
@@ -30,13 +31,17 @@ impl Component for Links {
         vec![
             Level {
                 name: "link_m",
-                start: 1e-4,
-                prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.3, nothing: 1e-6 },
+                start: 1e-4 * self.roughness,
+                prior: LevelPrior::Deviation { size: 5e-4 * self.roughness, exponent: 0.3, nothing: 1e-6 },
             },
             Level {
                 name: "link_rad",
-                start: 0.005 * degree,
-                prior: LevelPrior::Deviation { size: 0.03 * degree, exponent: 0.3, nothing: 1e-4 * degree },
+                start: 0.005 * degree * self.roughness,
+                prior: LevelPrior::Deviation {
+                    size: 0.03 * degree * self.roughness,
+                    exponent: 0.3,
+                    nothing: 1e-4 * degree,
+                },
             },
         ]
     }
