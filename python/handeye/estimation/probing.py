@@ -85,7 +85,8 @@ class Verification:
         Chance that touches disagree so much where everything is as stated.
     board_scale, board_sigma, board_p_value
         By how much the board is larger than stated as pictures and touches together have it, the standard
-        deviation, and the chance of that where it is as stated; None where no point of it was touched.
+        deviation, and the chance, by the ratio of likelihoods, of that where it is as stated; None where no
+        point of it was touched.
     alarm
         Whether touches or board are too unlikely.
     """
@@ -171,7 +172,9 @@ def verify(estimate: Estimate, together: Estimate, probing: Probing) -> Verifica
         at = 12 + len(together.free_camera)
         scale = together.board_scale
         sigma = float(np.sqrt(together.covariance[at, at]))
-        of_board = 1.0 - f_cumulative((scale / sigma) ** 2, 1, together.degrees_of_freedom)
+        # Twice the fall of the likelihood with a board as stated: chi-square of one degree of freedom.
+        fall = 0.0 if together.attribution is None else together.attribution.evidence.get("board_scale", 0.0)
+        of_board = 1.0 - f_cumulative(max(2 * fall, 0.0), 1, float("inf"))
     return Verification(
         misses_mm=tuple((1e3 * np.linalg.norm(r.reshape(-1, 3), axis=1)).tolist()),
         expected_mm=tuple((1e3 * np.sqrt(np.diag(covariance).reshape(-1, 3).sum(axis=1))).tolist()),

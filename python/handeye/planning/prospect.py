@@ -17,6 +17,8 @@ FEWEST_VIEWS = 5
 # A request is refused where even many views would miss it by this factor: what is believed of the noise after
 # few views is rough.
 MARGIN = 1.5
+# Of views that do not determine the answer, a forecast beyond this is what they leave open, not the arm.
+OPEN_MM = 100.0
 
 
 def prospect(estimate: Estimate, measurements: Measurements, views: int = MANY_VIEWS) -> Within:
@@ -48,12 +50,14 @@ class OutOfReach(StopRule):
 
     def verdict(self, state: State) -> Stop | None:
         """Stop as soon as the arm, the board and the camera are known to be too rough."""
-        if state.views < FEWEST_VIEWS or not state.estimate.determined:
+        if state.views < FEWEST_VIEWS:
             return None
         now = state.estimate.within_95
         if now.translation_mm <= self.translation_mm and now.rotation_deg <= self.rotation_deg:
             return None
         then = prospect(state.estimate, state.measurements)
+        if not state.estimate.determined and then.translation_mm > OPEN_MM:
+            return None  # nothing is known of the arm yet, but that the views leave a direction open
         far = then.translation_mm > MARGIN * self.translation_mm
         if not far and not then.rotation_deg > MARGIN * self.rotation_deg:
             return None

@@ -23,7 +23,6 @@ from handeye.robots import Arm, ArmKinematics, Joint
 from handeye.robots.displaced import displaced, random_displacements
 from handeye.simulation.mixed_arm import log_uniform, random_twist
 from handeye.types import Camera, Chessboard, Mounting, Pose, View
-from handeye.types.arrays import FloatArray
 from handeye.types.calibration import MM_PER_M
 
 BOARD = Chessboard(5, 7, 0.02)
@@ -197,7 +196,7 @@ def made_cell(random: np.random.Generator, mounting: Mounting, count: int) -> tu
     for _ in range(_TRIES):
         if len(views) == count:
             break
-        joints: FloatArray = random.uniform(0.8 * low, 0.8 * high)
+        joints = np.asarray(random.uniform(0.8 * low, 0.8 * high), np.float64)
         if views and random.uniform() < NEAR_ANOTHER:
             near = np.array(views[int(random.integers(len(views)))].joints_rad)
             joints = np.asarray(np.clip(near + random.normal(0, 0.35, len(arm)), low, high), np.float64)
