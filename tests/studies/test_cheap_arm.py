@@ -26,7 +26,7 @@ def test_play_is_found_where_the_joints_came_straight() -> None:
     assert 0.3 < np.rad2deg(levels["play_rad"]) < 4.0
     noise = [fit.posterior.levels[0][fit.posterior.level_names.index("joint_rad")] for fit in fits]
     assert noise[1] < 0.8 * noise[0]
-    assert roughness(fits[0].posterior) > 5.0
+    assert roughness(fits[0].posterior, described=True) > 5.0
     with_play = AutoEstimator(AutoOptions(kinematics, play=True))(measurements)
     off = np.linalg.norm((with_play.X.inverse().matrix - X.inverse().matrix)[:3, 3])
     assert 1e3 * off < 2 * with_play.within_95.translation_mm

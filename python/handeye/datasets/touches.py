@@ -3,7 +3,7 @@
 ::
 
     sigma_mm = 0.1              # how well a tip meets a point, per axis
-    notation = "ur"             # how poses are written; leave it away for T_base_flange as four rows
+    notation = "ur"             # how poses are written; without it poses are T_base_flange, four rows
     unit = "mm"
 
     [[tip]]

@@ -37,6 +37,8 @@ LARGEST_CAMERA_SHIFT_PX = 2.0
 MOST_CAMERAS = 4
 # Noise of a rotation or joint that arms in good order do not have, and about what they have at most.
 ROUGH_RAD, USUAL_NOISE_RAD = float(np.deg2rad(0.15)), float(np.deg2rad(0.03))
+# Where the arm is not described part of what hides shows as noise; by `handeye study cheap-arms`.
+NOT_DESCRIBED_POWER = 0.5
 # Components of the error whose constants belong to the arm.
 OF_ARM = frozenset({"joint_offsets", "links"})
 
@@ -216,11 +218,11 @@ def fit_cell(
     if unmirrored:
         measurements = measurements.with_pairs(unmirrored)
         fit = once(measurements, priors, start=_start(fit))
-    rough = roughness(fit.posterior)
+    rough = roughness(fit.posterior, described=arm is not None)
     return fit if rough == 1.0 else once(measurements, priors, start=_start(fit), rough=rough)
 
 
-def roughness(posterior: _core.Posterior) -> float:
+def roughness(posterior: _core.Posterior, *, described: bool) -> float:
     """How many times rougher an arm is than those that priors are about, by what its noise shows; else one.
 
     Servos that miss by a degree have zeros and links that are off as much: what hides in X and Y is believed
@@ -230,7 +232,9 @@ def roughness(posterior: _core.Posterior) -> float:
     noise = float(
         np.hypot.reduce([levels.get(name, 0.0) for name in ("flange_rad", "base_rad", "joint_rad")])
     )
-    return noise / USUAL_NOISE_RAD if noise > ROUGH_RAD else 1.0
+    if noise <= ROUGH_RAD:
+        return 1.0
+    return (noise / USUAL_NOISE_RAD) ** (1.0 if described else NOT_DESCRIBED_POWER)
 
 
 def _start(fit: CellFit) -> Start:

@@ -47,7 +47,7 @@ def _calibration(arm: CorrectedArm) -> str:
             raise InputError(
                 f"motor {joint.name}: an offset of {changed} steps, the servo keeps at most {LARGEST_OFFSET}",
                 code="out_of_range",
-                hint="calibrate it anew in the middle of its range",
+                hint="calibrate it again in the middle of its range",
             )
         motor["homing_offset"] = changed
     return json.dumps(motors, indent=4) + "\n"
