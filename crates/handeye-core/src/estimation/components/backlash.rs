@@ -28,7 +28,12 @@ impl Component for Backlash {
         vec![Level {
             name: "play_rad",
             start: 0.05 * degree,
-            prior: LevelPrior::Deviation { size: 0.5 * degree, exponent: 0.1, nothing: 1e-4 * degree },
+            prior: LevelPrior::Deviation {
+                size: 0.5 * degree,
+                exponent: 0.1,
+                tail: 1.0,
+                nothing: 1e-4 * degree,
+            },
         }]
     }
 

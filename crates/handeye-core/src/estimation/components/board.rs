@@ -24,7 +24,7 @@ impl Component for BoardScale {
         vec![Level {
             name: "board_scale",
             start: if self.touched { 3e-3 } else { 1e-4 },
-            prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.1, nothing: 1e-6 },
+            prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.1, tail: 1.0, nothing: 1e-6 },
         }]
     }
 

@@ -31,9 +31,10 @@ impl Component for JointOffsets {
             name: "offset_rad",
             start: 0.01 * degree * self.roughness,
             prior: LevelPrior::Deviation {
-                size: 0.05 * degree * self.roughness,
-                exponent: 0.25,
-                nothing: 1e-4 * degree,
+                size: 0.07 * degree * self.roughness,
+                exponent: 0.35,
+                tail: 1.0,
+                nothing: 1e-6 * degree,
             },
         }]
     }
