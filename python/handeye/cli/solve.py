@@ -74,10 +74,8 @@ def solve(
     """
     check_output(output)
     if source.only is None and is_rig(folder):
-        if certify or page.ui or touches is not None:
-            raise UsageError(
-                "--certify, --touches and --ui take one camera", hint="leave them out for several"
-            )
+        if page.ui or touches is not None:
+            raise UsageError("--touches and --ui take one camera", hint="leave them out for several")
         rig = source.open_rig(folder)
         views = [station.views[0].view for station in rig.recording.stations]
         return answer_for_rig(
@@ -87,6 +85,7 @@ def solve(
             reduced=reduced,
             kinematics=arm.kinematics(views, model),
             camera_fixed=camera_fixed,
+            certify=certify,
         )
     opened = source.open_any(folder, arm.described())
     if isinstance(opened, PosePairs):
