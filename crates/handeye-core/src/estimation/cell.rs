@@ -1,9 +1,8 @@
 //! What stands in a cell, and what was measured there.
 
-use nalgebra::{DMatrix, DVector, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 
 use super::pose_measurement::PoseMeasurement;
-use super::touched::{self, Tip, Touch};
 use crate::error::Error;
 use crate::se3::Se3;
 
@@ -71,6 +70,42 @@ pub struct Measurement {
     pub pose: PoseMeasurement,
     /// Variance of the pixels, px^2.
     pub variance_px2: f64,
+}
+
+/// A point that is not on a board: the tip of a tool in the flange, or a fixed point in the base.
+#[derive(Clone, Debug)]
+pub struct Tip {
+    /// What it is fixed to.
+    pub body: Body,
+    /// Where it is believed to be in its body.
+    pub at: Vector3<f64>,
+    /// How well that is known.
+    pub information: Matrix3<f64>,
+}
+
+/// A point that touches or is touched.
+#[derive(Clone, Copy, Debug)]
+pub enum TouchPoint {
+    /// A point of a target, in its own frame.
+    OfTarget {
+        /// Which target.
+        target: usize,
+        /// Where.
+        at: Vector3<f64>,
+    },
+    /// One of the cell's tips.
+    Tip(usize),
+}
+
+/// Two points that met.
+#[derive(Clone, Debug)]
+pub struct Touch {
+    /// Where the arm stood.
+    pub station: usize,
+    /// The two points, one on the flange and one on the base.
+    pub points: [TouchPoint; 2],
+    /// Covariance of how well they met, in the base.
+    pub covariance: Matrix3<f64>,
 }
 
 /// A cell and what was measured in it.
@@ -162,7 +197,42 @@ impl Cell {
                 return Err(Error::invalid(format!("camera {c}: its prior is not of its parameters")));
             }
         }
-        touched::check(self)
+        self.check_touches()
+    }
+
+    /// What a point is fixed to; `None` where there is no such target or tip.
+    pub(super) fn body_of(&self, point: TouchPoint) -> Option<Body> {
+        match point {
+            TouchPoint::OfTarget { target, .. } => self.targets.get(target).copied(),
+            TouchPoint::Tip(tip) => self.tips.get(tip).map(|t| t.body),
+        }
+    }
+
+    /// # Errors
+    /// [`Error::InvalidInput`] naming what does not fit.
+    fn check_touches(&self) -> Result<(), Error> {
+        let seen = self.measurements.iter().map(|m| m.station).max();
+        for (k, touch) in self.touches.iter().enumerate() {
+            let bodies = touch.points.map(|point| self.body_of(point));
+            let mut both = bodies.iter().flatten();
+            if both.next() == both.next() || bodies.contains(&None) {
+                return Err(Error::invalid(format!(
+                    "touch {k}: a point of the flange and one of the base are needed"
+                )));
+            }
+            if touch.station >= self.stations.len() || seen.is_some_and(|last| touch.station <= last) {
+                return Err(Error::invalid(format!(
+                    "touch {k}: its station must come after those of the pictures"
+                )));
+            }
+            if touch.covariance.cholesky().is_none() {
+                return Err(Error::invalid(format!("touch {k}: its covariance is not positive")));
+            }
+        }
+        if !self.touches.is_sorted_by(|a, b| a.station < b.station) {
+            return Err(Error::invalid("touches must come one to a station, in order"));
+        }
+        Ok(())
     }
 }
 

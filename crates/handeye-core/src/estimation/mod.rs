@@ -30,7 +30,6 @@ mod sandwich;
 mod slopes;
 mod start;
 mod systems;
-mod touched;
 mod twists;
 mod weak_prior;
 
@@ -38,7 +37,7 @@ mod weak_prior;
 mod tests;
 
 pub use agreement::{Agreement, SetFit};
-pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station};
+pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station, Tip, Touch, TouchPoint};
 pub use cell_start::{CellStart, start_of_cell};
 pub use components::Assumptions;
 pub use levels::{Level, LevelPrior};
@@ -46,5 +45,4 @@ pub use pixel_field::{SlowResiduals, shared_error};
 pub use pose_measurement::{PoseMeasurement, compress, relative_weights, shrunk_variances};
 pub use posterior::{Attribution, Node, Options, Posterior, estimate};
 pub use start::{ChainStart, start_from_poses};
-pub use touched::{Tip, Touch, TouchPoint};
 pub use weak_prior::WeakPrior;
