@@ -28,7 +28,8 @@ class Step:
 
 def pages() -> list[Path]:
     """Return every page of the documentation."""
-    return [path for path in sorted(DOCS.rglob("*.md")) if "_build" not in path.parts]
+    made = {"_build", "reference"}  # by the build, from the code
+    return [path for path in sorted(DOCS.rglob("*.md")) if not made & set(path.parts)]
 
 
 def steps(markdown: str) -> list[Step]:
