@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Component;
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// The scale of every board, relative to one.
 pub(in crate::estimation) struct BoardScale;

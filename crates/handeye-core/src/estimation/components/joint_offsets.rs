@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::{Arm, Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// Offsets of the joints between the first and the last, which only say where base and flange are.
 pub(in crate::estimation) struct JointOffsets {

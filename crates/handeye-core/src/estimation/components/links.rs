@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::{Arm, Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// Displacements in metres and tilts in radians, each with a level of its own.
 pub(in crate::estimation) struct Links {

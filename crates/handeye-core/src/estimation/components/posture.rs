@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::{Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::{Linearisation, Rows};
-use crate::estimation::mixed::{Effect, Term};
 
 /// Flange poses further apart than this have little of an error in common; a chord of 2 is half a turn.
 const LIKENESS_M: f64 = 1.0;
