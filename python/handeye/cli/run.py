@@ -14,7 +14,7 @@ from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder
 from handeye.cli.page import Live, Page
 from handeye.cli.run_answer import judged_by, run_answer
-from handeye.cli.run_options import Lens, Limits, Simulated, Timeouts
+from handeye.cli.run_options import Lens, Limits, Simulated, TimeoutOptions
 from handeye.cli.work import WorkOptions, check_touch
 from handeye.datasets import read_camera, read_target
 from handeye.estimation import Estimate
@@ -67,7 +67,7 @@ def run(
     confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen, like those below
     work: WorkOptions = WorkOptions(),  # noqa: B008
-    timeouts: Timeouts = Timeouts(),  # noqa: B008
+    timeouts: TimeoutOptions = TimeoutOptions(),  # noqa: B008
     unknown: Lens = Lens(),  # noqa: B008
     simulated: Simulated = Simulated(),  # noqa: B008
     page: Page = Page(),  # noqa: B008
@@ -162,7 +162,7 @@ def run(
             float(np.deg2rad(limits.tilt_deg)),
             limits.margin_px,
         ),
-        patience=timeouts.patience(driver, images),
+        timeouts=timeouts.timeouts(driver, images),
         camera_known=not (unknown.uncalibrated and driver == SIMULATED),
         lens=unknown.lens,
         accuracy_px=unknown.accuracy_px,
