@@ -58,6 +58,7 @@ def run(
     accuracy_deg: float = 0.05,
     touch_mm: float | None = None,
     max_views: int = 20,
+    anyway: bool = False,
     seed: Seed = 0,
     model: ModelName = ModelName.AUTO,
     policy: str = "next_best_view",
@@ -107,6 +108,9 @@ def run(
         work, and choose views for it.
     max_views
         Stop at so many views in any case.
+    anyway
+        Go on where the accuracy is out of reach. Else a run ends where, from five views on, even 40 would not
+        come near it, and says what they would come to.
     seed
         Of every choice by chance, and of the simulated cell.
     model
@@ -169,6 +173,7 @@ def run(
         simulation=simulated.simulation(),
         touch_mm=touch_mm,
         work=work.work(),
+        anyway=anyway,
     )
     if (driver == SIMULATED) != (images == SIMULATED):
         raise UsageError("--driver and --images are either both simulated or both not")

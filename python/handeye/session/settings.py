@@ -74,6 +74,8 @@ class Configuration:
         How well such a camera is to be known, see `Wish`.
     touch_mm, work
         Touch error to reach in place of the accuracy, and what is seen and touched.
+    anyway
+        Go on although the accuracy is out of reach, see `Wish`.
     """
 
     robot: str | None
@@ -101,6 +103,7 @@ class Configuration:
     simulation: Simulation = field(default_factory=Simulation)
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
+    anyway: bool = False
 
     @property
     def is_simulated(self) -> bool:
@@ -133,6 +136,7 @@ class Configuration:
             accuracy_px=None if self.camera_known else self.accuracy_px,
             touch_mm=self.touch_mm,
             work=self.work,
+            anyway=self.anyway,
         )
 
     def workspace(self) -> Workspace:
