@@ -118,8 +118,8 @@ def franka(_: argparse.Namespace, seed: int) -> Iterator[tuple[Shown, str, str]]
     from franky_sim.base_simulator import BaseRobot  # noqa: PLC0415
     from franky_sim.mujoco_simulator import MujocoSimulator  # noqa: PLC0415
 
-    # franky-sim 1.0.4 hands out its one pose and computes the next one into it: O_T_EE, the measured pose, comes
-    # out as that of the commanded joints, 0.1 deg beside the measured ones. Here it hands out copies.
+    # franky-sim 1.0.4 hands out its one pose and computes the next one into it: O_T_EE, the measured pose,
+    # comes out as that of the commanded joints, 0.1 deg beside the measured ones. Here it hands out copies.
     shared = BaseRobot.kinematics
     BaseRobot.kinematics = lambda self, q: pinocchio.SE3(shared(self, q))
     described = Path(franky_sim.__file__).parent / "assets" / "fr3_clean.urdf"
