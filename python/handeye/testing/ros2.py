@@ -96,11 +96,9 @@ class MockRos2:
             self._kind,
             ACTION,
             execute_callback=self._executed,
-            goal_callback=lambda _: (
-                action.GoalResponse.REJECT if self.refuses else action.GoalResponse.ACCEPT
-            ),
+            goal_callback=self._judged,
             handle_accepted_callback=self._accepted,
-            cancel_callback=lambda _: action.CancelResponse.ACCEPT,
+            cancel_callback=self._canceled,
             callback_group=group,
         )
         node.create_timer(1.0 / STATE_HZ, self._tell)
@@ -184,6 +182,13 @@ class MockRos2:
 
     # What it does.
 
+    def _judged(self, _: Any) -> Any:  # noqa: ANN401 - of rclpy
+        response = ros_library("rclpy.action").GoalResponse
+        return response.REJECT if self.refuses else response.ACCEPT
+
+    def _canceled(self, _: Any) -> Any:  # noqa: ANN401 - of rclpy
+        return ros_library("rclpy.action").CancelResponse.ACCEPT
+
     def _accepted(self, handle: Any) -> None:  # noqa: ANN401 - of rclpy
         self._motion = handle
         threading.Thread(target=handle.execute, daemon=True).start()
@@ -192,9 +197,11 @@ class MockRos2:
         """Follow the points, between them on straight lines; rest where it is once that is canceled."""
         result = self._kind.Result()
         trajectory = handle.request.trajectory
-        order = [list(trajectory.joint_names).index(name) for name in self._cell.arm.joint_names]
+        names: list[str] = list(trajectory.joint_names)
+        order = [names.index(name) for name in self._cell.arm.joint_names]
         times = [0.0, *(p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in trajectory.points)]
-        places = np.array([self._q, *(np.array(p.positions)[order] for p in trajectory.points)])
+        asked: list[list[float]] = [list(point.positions) for point in trajectory.points]
+        places = np.vstack([self._q, np.array(asked)[:, order]])
         try:
             there = self._shown_at(places[-1])
         except DeviceError as error:

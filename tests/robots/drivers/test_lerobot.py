@@ -120,10 +120,10 @@ def test_no_servo_is_ever_told_speed_zero(bus: MockFeetechBus, robot: LeRobotArm
     ("change", "words"),
     [
         (lambda c: c.pop("wrist_flex"), "wrist_flex"),
-        (lambda c: c["elbow_flex"].update(range_min=3500), "empty"),
-        (lambda c: c["elbow_flex"].update(range_max=9000), "elbow_flex"),
-        (lambda c: c["elbow_flex"].update(id="3"), "elbow_flex"),
-        (lambda c: c["elbow_flex"].update(drive_mode=1), "drive_mode"),
+        (lambda c: c["elbow_flex"].update(range_min=3500), "range 3500 to 3400"),
+        (lambda c: c["elbow_flex"].update(range_max=9000), "range 700 to 9000"),
+        (lambda c: c["elbow_flex"].update(id="3"), "Expected `int`"),
+        (lambda c: c["elbow_flex"].update(drive_mode=1), "drive_mode 1"),
     ],
 )
 def test_a_calibration_that_cannot_be_used_is_refused(

@@ -4,15 +4,14 @@ The servos have no watchdog: they are sent a place a moment ahead, again and aga
 or the cable fails the arm stops after that moment.
 """
 
-import json
 import math
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import numpy as np
 
 from handeye.errors import DeviceError, InputError
@@ -29,7 +28,7 @@ from handeye.robots.shipped import open_arm
 from handeye.types import Pose
 from handeye.types.arrays import FloatArray
 
-MAX_BYTES = 1 << 20
+MAX_BYTES, MOST_SERVOS = 1 << 20, 252
 STEP_RAD = 2 * math.pi / STEPS_PER_TURN
 ACCELERATION_RAD_S2 = 1.5
 # Places are sent so often, each the one of so much later.
@@ -38,6 +37,15 @@ CYCLE_S, AHEAD_S = 0.03, 0.15
 HURRY = 1.5
 # A servo that bears a load stays a little short; the arm rests where no joint has moved by more in so long.
 NEAR_RAD, REST_RAD, REST_S, SETTLE_S = 0.05, 1.5 * STEP_RAD, 0.3, 5.0
+
+
+class _Entry(msgspec.Struct):
+    """What LeRobot has written of a joint."""
+
+    id: int
+    range_min: int
+    range_max: int
+    drive_mode: int = 0
 
 
 @dataclass(frozen=True)
@@ -239,27 +247,26 @@ def _calibrated(file: Path, arm: Arm) -> list[_Servo]:
         The file cannot be used, or lacks a joint.
     """
     try:
-        text = file.read_bytes()[: MAX_BYTES + 1]
-        read: Any = json.loads(text) if len(text) <= MAX_BYTES else None
-    except (OSError, ValueError, RecursionError) as error:
+        text = file.read_bytes()
+        entries = msgspec.json.decode(text[:MAX_BYTES], type=dict[str, _Entry])
+    except (OSError, msgspec.MsgspecError, RecursionError) as error:
         raise InputError(f"{file}: {str(error)[:200]}", code="bad_calibration") from error
     servos: list[_Servo] = []
     for name in arm.joint_names:
-        entry: Any = read.get(name) if isinstance(read, dict) else None
-        numbers = (
-            [entry.get(key) for key in ("id", "range_min", "range_max")] if isinstance(entry, dict) else []
-        )
-        if len(numbers) != 3 or not all(isinstance(n, int) and 0 <= n < STEPS_PER_TURN for n in numbers):
+        entry = entries.get(name)
+        if entry is None:
             raise InputError(
-                f"{file}: no calibration of joint {name[:60]!r} (id, range_min, range_max)",
+                f"{file}: no calibration of joint {name[:60]!r}",
                 code="bad_calibration",
                 hint="the joints of the description must have LeRobot's names, such as shoulder_pan",
             )
-        number, low, high = numbers
-        if low >= high or number > 252 or entry.get("drive_mode", 0) != 0:
+        ordered = 0 <= entry.range_min < entry.range_max < STEPS_PER_TURN
+        if not ordered or not 0 <= entry.id <= MOST_SERVOS or entry.drive_mode != 0:
             raise InputError(
-                f"{file}: joint {name[:60]!r}: a range that is empty, or a drive_mode other than 0",
+                f"{file}: joint {name[:60]!r}: range {entry.range_min} to {entry.range_max}, servo {entry.id}, "
+                f"drive_mode {entry.drive_mode}; expected steps of one turn, 0 to {MOST_SERVOS}, and 0",
                 code="bad_calibration",
             )
-        servos.append(_Servo(number, (low + high) / 2, low, high))
+        middle = (entry.range_min + entry.range_max) / 2
+        servos.append(_Servo(entry.id, middle, entry.range_min, entry.range_max))
     return servos

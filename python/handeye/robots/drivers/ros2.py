@@ -282,7 +282,11 @@ def profile(
 def _answer(future: Any, timeout_s: float, what: str) -> Any:  # noqa: ANN401 - of rclpy
     """Return what a future brings, spun by another thread."""
     done = threading.Event()
-    future.add_done_callback(lambda _: done.set())
+
+    def tell(_: Any) -> None:  # noqa: ANN401 - the future itself
+        done.set()
+
+    future.add_done_callback(tell)
     if not done.wait(timeout_s):
         raise DeviceError(f"{what}: no answer within {timeout_s:.0f} s", code="connection_lost")
     return future.result()
