@@ -263,8 +263,8 @@ def _calibrated(file: Path, arm: Arm) -> list[_Servo]:
         ordered = 0 <= entry.range_min < entry.range_max < STEPS_PER_TURN
         if not ordered or not 0 <= entry.id <= MOST_SERVOS or entry.drive_mode != 0:
             raise InputError(
-                f"{file}: joint {name[:60]!r}: range {entry.range_min} to {entry.range_max}, servo {entry.id}, "
-                f"drive_mode {entry.drive_mode}; expected steps of one turn, 0 to {MOST_SERVOS}, and 0",
+                f"{file}: joint {name[:60]!r}: range {entry.range_min} to {entry.range_max}, servo "
+                f"{entry.id}, drive_mode {entry.drive_mode}; expected steps of one turn, 0 to {MOST_SERVOS}, and 0",
                 code="bad_calibration",
             )
         middle = (entry.range_min + entry.range_max) / 2
