@@ -264,7 +264,8 @@ def _calibrated(file: Path, arm: Arm) -> list[_Servo]:
         if not ordered or not 0 <= entry.id <= MOST_SERVOS or entry.drive_mode != 0:
             raise InputError(
                 f"{file}: joint {name[:60]!r}: range {entry.range_min} to {entry.range_max}, servo "
-                f"{entry.id}, drive_mode {entry.drive_mode}; expected steps of one turn, 0 to {MOST_SERVOS}, and 0",
+                f"{entry.id}, drive_mode {entry.drive_mode}; "
+                f"expected steps of one turn, 0 to {MOST_SERVOS}, and 0",
                 code="bad_calibration",
             )
         middle = (entry.range_min + entry.range_max) / 2
