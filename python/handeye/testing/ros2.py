@@ -201,7 +201,7 @@ class MockRos2:
         order = [names.index(name) for name in self._cell.arm.joint_names]
         times = [0.0, *(p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in trajectory.points)]
         asked: list[list[float]] = [list(point.positions) for point in trajectory.points]
-        places = np.vstack([self._q, np.array(asked)[:, order]])
+        places: FloatArray = np.vstack([self._q, np.array(asked)[:, order]])
         try:
             there = self._shown_at(places[-1])
         except DeviceError as error:
@@ -216,7 +216,7 @@ class MockRos2:
                 result.error_code, result.error_string = -1, "canceled"
                 (handle.canceled if handle.is_cancel_requested else handle.abort)()
                 return result
-            self._q = np.array([np.interp(at_s, times, column) for column in places.T])
+            self._q = np.array([float(np.interp(at_s, times, column)) for column in places.T])
             time.sleep(0.004)
         self._q, self._seen = places[-1], there
         handle.succeed()
