@@ -199,7 +199,11 @@ class MockRos2:
         trajectory = handle.request.trajectory
         names: list[str] = list(trajectory.joint_names)
         order = [names.index(name) for name in self._cell.arm.joint_names]
-        times = [0.0, *(p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in trajectory.points)]
+        stamps: list[float] = [
+            float(point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec)
+            for point in trajectory.points
+        ]
+        times = [0.0, *stamps]
         asked: list[list[float]] = [list(point.positions) for point in trajectory.points]
         places: FloatArray = np.vstack([self._q, np.array(asked)[:, order]])
         try:
@@ -216,7 +220,9 @@ class MockRos2:
                 result.error_code, result.error_string = -1, "canceled"
                 (handle.canceled if handle.is_cancel_requested else handle.abort)()
                 return result
-            self._q = np.array([float(np.interp(at_s, times, column)) for column in places.T])
+            k = min(max(int(np.searchsorted(times, at_s)), 1), len(times) - 1)
+            share = (at_s - times[k - 1]) / (times[k] - times[k - 1])
+            self._q = places[k - 1] + share * (places[k] - places[k - 1])
             time.sleep(0.004)
         self._q, self._seen = places[-1], there
         handle.succeed()

@@ -92,9 +92,9 @@ def link(monkeypatch: pytest.MonkeyPatch) -> Iterator[type[FakeLink]]:
     monkeypatch.setattr(
         ros2, "ros_library", lambda _: SimpleNamespace(Image="Image", CameraInfo="CameraInfo")
     )
-    monkeypatch.setattr(ros2, "GRAB_S", 0.4)
-    monkeypatch.setattr(ros2, "STARTS_S", 0.5)
-    monkeypatch.setattr(ros2, "INFO_S", 0.3)
+    monkeypatch.setattr(ros2, "GRAB_S", 1.5)
+    monkeypatch.setattr(ros2, "STARTS_S", 1.5)
+    monkeypatch.setattr(ros2, "INFO_S", 1.0)
     yield made
     FakeLink.last.close()
 

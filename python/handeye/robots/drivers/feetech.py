@@ -9,7 +9,7 @@ from typing import Any
 from handeye.errors import DeviceError
 from handeye.extension import library
 
-BAUD, ANSWER_S, TRIES = 1_000_000, 0.05, 3
+BAUD, ANSWER_S, TRIES = 1_000_000, 0.3, 3
 HEAD = b"\xff\xff"
 PING, READ, WRITE, SYNC_WRITE = 1, 2, 3, 0x83
 EVERYBODY = 0xFE

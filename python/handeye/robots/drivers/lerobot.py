@@ -36,7 +36,9 @@ CYCLE_S, AHEAD_S = 0.03, 0.15
 # The servo may hurry after its place by so much; 0 would be as fast as it can.
 HURRY = 1.5
 # A servo that bears a load stays a little short; the arm rests where no joint has moved by more in so long.
-NEAR_RAD, REST_RAD, REST_S, SETTLE_S = 0.05, 1.5 * STEP_RAD, 0.3, 5.0
+NEAR_RAD, REST_RAD, REST_S, SETTLE_S = 0.05, 1.5 * STEP_RAD, 0.3, 20.0
+# Short of its place it may only be late.
+LATE_S = 2.0
 
 
 class _Entry(msgspec.Struct):
@@ -118,7 +120,7 @@ class LeRobotArm:
         with self._moving:
             here = self._joints()
             self._lead(here, there, goal.speed_rad_s)
-            joints = self._settled()
+            joints = self._settled(there)
         off = float(np.abs(joints - there).max())
         if self._stopped.is_set() or off > NEAR_RAD:
             raise DeviceError(f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it", code="stopped")
@@ -203,16 +205,19 @@ class LeRobotArm:
             round(servo.zero + q / STEP_RAD) for q, servo in zip(joints.tolist(), self._servos, strict=True)
         ]
 
-    def _settled(self) -> FloatArray:
-        """Return the joints (n,) once they no longer change."""
+    def _settled(self, there: FloatArray | None = None) -> FloatArray:
+        """Return the joints (n,) once they no longer change, longer where they are not yet `there`."""
         end = time.monotonic() + SETTLE_S
         since_s, reference = time.monotonic(), np.full(len(self._servos), np.inf)
         while time.monotonic() < end:
             joints = self._joints()
             if np.abs(joints - reference).max() > REST_RAD:
                 since_s, reference = time.monotonic(), joints
-            elif time.monotonic() - since_s > REST_S:
-                return joints
+            else:
+                late = there is not None and np.abs(joints - there).max() > NEAR_RAD
+                patient_s = LATE_S if late and not self._stopped.is_set() else REST_S
+                if time.monotonic() - since_s > patient_s:
+                    return joints
             time.sleep(CYCLE_S)
         raise DeviceError("the arm does not come to rest", code="not_at_rest")
 
