@@ -36,7 +36,7 @@ CYCLE_S, AHEAD_S = 0.03, 0.15
 # The servo may hurry after its place by so much; 0 would be as fast as it can.
 HURRY = 1.5
 # A servo that bears a load stays a little short; the arm rests where no joint has moved by more in so long.
-NEAR_RAD, REST_RAD, REST_S, SETTLE_S = 0.05, 1.5 * STEP_RAD, 0.3, 20.0
+NEAR_RAD, REST_RAD, REST_S, SETTLE_S = 0.05, 1.5 * STEP_RAD, 0.6, 20.0
 # Short of its place it may only be late.
 LATE_S = 2.0
 
@@ -214,7 +214,7 @@ class LeRobotArm:
             if np.abs(joints - reference).max() > REST_RAD:
                 since_s, reference = time.monotonic(), joints
             else:
-                late = there is not None and np.abs(joints - there).max() > NEAR_RAD
+                late = there is not None and np.abs(joints - there).max() > 2 * REST_RAD
                 patient_s = LATE_S if late and not self._stopped.is_set() else REST_S
                 if time.monotonic() - since_s > patient_s:
                     return joints
