@@ -23,7 +23,7 @@ from handeye.session.settings import Configuration
 pytestmark = needs_browser
 QUICK = ("--points-only", "0.1")
 # Nothing ends it by itself before a busy machine has pressed a button.
-LONG = ("--accuracy-mm", "0.001", "--max-views", "400")
+LONG = ("--accuracy-mm", "0.001", "--max-views", "400", "--anyway")
 SERIOUS = {"serious", "critical"}
 
 

@@ -34,6 +34,14 @@ study.command(
     "handeye.cli.study_touch:touch", name="touch", help="Count how often the tool lands where it is said to."
 )
 study.command(
+    "handeye.cli.study_shift:shift", name="shift", help="Count how often a check finds and names what moved."
+)
+study.command(
+    "handeye.cli.study_probing:probing", name="probing", help="Count what finds a board of another size."
+)
+study.command("handeye.cli.study_arm:arm", name="arm", help="Compare arms put right with the truth.")
+study.command("handeye.cli.study_cheap_arms:cheap_arms", name="cheap-arms", help="Try arms of hobby servos.")
+study.command(
     "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
 )
 study.command(
