@@ -74,8 +74,8 @@ def solve(
     """
     check_output(output)
     if source.only is None and is_rig(folder):
-        if page.ui or touches is not None:
-            raise UsageError("--touches and --ui take one camera", hint="leave them out for several")
+        if touches is not None:
+            raise UsageError("--touches takes one camera", hint="leave it out for several")
         rig = source.open_rig(folder)
         views = [station.views[0].view for station in rig.recording.stations]
         return answer_for_rig(
@@ -86,6 +86,8 @@ def solve(
             kinematics=arm.kinematics(views, model),
             camera_fixed=camera_fixed,
             certify=certify,
+            page=page,
+            arm=arm,
         )
     opened = source.open_any(folder, arm.described())
     if isinstance(opened, PosePairs):
