@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::{Linearisation, Rows};
-use crate::estimation::mixed::{Effect, Term};
 
 /// White noise of the target's position across and along the line of sight, and of its rotation.
 pub(in crate::estimation) struct Detector;
