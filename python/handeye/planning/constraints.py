@@ -12,7 +12,7 @@ from handeye.planning.collisions import Body
 from handeye.planning.prediction import Sight
 from handeye.planning.visibility import obstacles
 from handeye.robots import Arm
-from handeye.types import Mounting
+from handeye.types import Mounting, Pose, Target
 from handeye.types.arrays import FloatArray, IndexArray
 
 # A lens that is known this well needs no room of its own.
@@ -153,10 +153,14 @@ def mounted_points(estimate: Estimate) -> FloatArray:
     """(P, 3) points in the flange of what is mounted there: the camera's centre, or the target's corners."""
     if estimate.mounting is Mounting.EYE_IN_HAND:
         return estimate.X.inverse().matrix[np.newaxis, :3, 3]
-    points = estimate.target.points
-    low, high = points.min(axis=0), points.max(axis=0)
+    return corners_at(estimate.target, estimate.Y)
+
+
+def corners_at(target: Target, Y: Pose) -> FloatArray:
+    """(4, 3) the corners of the box around a target, whose pose is Y."""
+    low, high = target.points.min(axis=0), target.points.max(axis=0)
     corners = np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
-    return estimate.Y.act(corners)
+    return Y.act(corners)
 
 
 def _doubt_px(estimate: Estimate, limits: ViewLimits) -> float:

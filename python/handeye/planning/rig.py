@@ -16,10 +16,12 @@ from handeye.errors import InputError
 from handeye.estimation import Estimate, RigEstimate
 from handeye.estimation.confidence import Within
 from handeye.planning.candidates import Pool
+from handeye.planning.constraints import corners_at
 from handeye.planning.prediction import Prediction, Sight
 from handeye.planning.visibility import obstacles
 from handeye.types.arrays import FloatArray
 from handeye.types.mounting import Mounting
+from handeye.types.rig import Body
 
 Pair = tuple[str, str]
 # Candidates whose joint information is computed.
@@ -77,6 +79,22 @@ def rigid_pairs(estimate: RigEstimate) -> list[Pair]:
 
 def _factor(now: Within, translation_mm: float, rotation_deg: float) -> float:
     return max(now.translation_mm / translation_mm, now.rotation_deg / rotation_deg)
+
+
+def mounted_on_flange(estimate: RigEstimate) -> FloatArray:
+    """(P, 3) points in the flange of what is mounted there: centres of cameras, corners of targets."""
+    fit = estimate.fit
+    parts = [
+        fit.X[name].inverse().matrix[np.newaxis, :3, 3]
+        for name, one in fit.measurements.cameras.items()
+        if one.body is Body.FLANGE
+    ]
+    parts += [
+        corners_at(one.target, fit.Y[name])
+        for name, one in fit.measurements.targets.items()
+        if one.body is Body.FLANGE
+    ]
+    return np.concatenate([np.zeros((0, 3)), *parts])
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,6 +40,8 @@ class Wish:
         What is seen and touched.
     refine
         Climb from the best candidates to better ones near them, rather than take the best that was drawn.
+    camera_to_camera
+        With several cameras: radii (mm, deg) for those of one body in each other; None for none.
     accuracy_px
         Where the views teach the camera too: how well, see `Requested`. None for a calibrated camera.
 
@@ -63,6 +65,7 @@ class Wish:
     accuracy_px: float | None = None
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
+    camera_to_camera: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         self.rules()  # checks what they check
