@@ -28,7 +28,7 @@ from handeye.session.deciding import (
     halt_of,
 )
 from handeye.session.entry import TRANSIENT, Entry, Failure
-from handeye.session.starting import Start, starting_goal
+from handeye.session.starting import Start, largest_tilt_rad, starting_goal
 from handeye.session.wish import Wish
 from handeye.types import Camera, Pose
 
@@ -103,7 +103,9 @@ class ArmChooser:
                 )
         places = len({entry.goal_joints for entry in missed})
         body = self._body if estimate is None else self._generator.body(estimate)
-        found = starting_goal(self._start, views, places, self._camera, body, situation.standing(self._start))
+        tilt_rad = largest_tilt_rad(views[0], self._camera) if views else 0.0
+        standing = situation.standing(self._start)
+        found = starting_goal(self._start, len(views), places, tilt_rad, body, standing)
         if found is None:
             return Halt(
                 EndReason.NO_START if estimate is None else EndReason.NO_CANDIDATE,

@@ -74,7 +74,7 @@ class RigSession(Stepping[RigSituation, RigEnd]):
         return RigSituation(self._entries(), tuple(stations_of(self._store.entries)), self._believed())
 
     def _believed(self) -> RigEstimate | None:
-        """Return what is believed; None while the stations do not say enough of every camera.
+        """Return what is believed; None while the stations do not determine every camera.
 
         One wrong view would make all the others look uncertain. Mistakes are looked for only where a view
         stands out: the end of the session looks for them in any case.
@@ -105,15 +105,16 @@ class RigSession(Stepping[RigSituation, RigEnd]):
     def _estimated(self, measurements: RigMeasurements) -> RigEstimate | None:
         try:
             check_tied(measurements)
-            return estimate_rig(measurements, self._kinematics)
+            estimate = estimate_rig(measurements, self._kinematics)
         except (InputError, DegenerateError):
             return None
+        return estimate if estimate.determined else None
 
     def _end(self, reason: EndReason, sentence: str) -> RigEnd:
         stations, attempts = len(self._store.recording), len(self._store.entries)
         believed = self._believed()
         calibration = None
-        if believed is not None and believed.determined:
+        if believed is not None:
             try:
                 calibration = solve_rig(self._store.recording, kinematics=self._kinematics)
             except InputError as error:

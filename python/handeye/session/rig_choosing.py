@@ -3,6 +3,7 @@
 The chance in a decision follows from the seed and the attempts so far.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,16 +19,13 @@ from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
 from handeye.session.deciding import Attempts, EndReason, Halt, Step
 from handeye.session.safety import body_of
-from handeye.session.starting import Start
+from handeye.session.starting import Start, largest_tilt_rad, starting_goal
 from handeye.session.wish import Wish
-from handeye.types import Pose, Station
+from handeye.types import MountedCamera, Pose, Station
 from handeye.types.arrays import FloatArray
 
-# Turns of the joints about the start while little is known, and by how much they shrink where they fail.
-START_SPREAD_RAD, START_SHRINK = 0.2, 0.85
 # Postures are drawn this far about those of the stations.
 SPREAD_RAD = 0.25
-STARTS = 40
 # Candidates whose straight path is looked at.
 MOST_PATHS = 24
 MARGIN_PX = 25.0
@@ -42,7 +40,7 @@ class RigSituation(Attempts):
     stations
         What the attempts brought, without what was withdrawn.
     believed
-        What is believed; None while the stations do not tie every camera to the arm.
+        What is believed; None while the stations do not determine every camera.
     """
 
     stations: tuple[Station, ...]
@@ -56,6 +54,8 @@ class RigChooser:
     ----------
     arm, workspace
         The arm, and what no motion may leave.
+    cameras
+        By name.
     start
         Where the arm stood when the session began.
     wish
@@ -70,6 +70,7 @@ class RigChooser:
         self,
         arm: Arm,
         workspace: Workspace,
+        cameras: Mapping[str, MountedCamera],
         start: Start,
         wish: Wish,
         solids: SolidLinks | None = None,
@@ -77,7 +78,7 @@ class RigChooser:
         candidates: int,
     ) -> None:
         self._arm, self._workspace, self._solids = arm, workspace, solids
-        self._start, self._wish = start, wish
+        self._cameras, self._start, self._wish = cameras, start, wish
         self._request = request_of(wish)
         self._candidates = candidates
 
@@ -103,35 +104,47 @@ class RigChooser:
         if last is not None:
             goal = Goal(situation.label("station"), last.goal, last.goal_joints, self._wish.speed_rad_s)
             return Step(goal, "retry", {"after": last.number}, None, believed=believed)
-        if believed is None or not believed.determined:
+        if believed is None:
             return self._starting(situation)
         return self._planned(situation, believed)
 
     def _met(self, believed: RigEstimate, count: int) -> bool:
-        return (
-            self._request is not None
-            and believed.determined
-            and count >= FEWEST_STATIONS
-            and not self._request.missing(believed)
-        )
+        return self._request is not None and count >= FEWEST_STATIONS and not self._request.missing(believed)
 
     def _random(self, situation: RigSituation) -> np.random.Generator:
         return np.random.default_rng([self._wish.seed, 4, len(situation.entries)])
 
     def _starting(self, situation: RigSituation) -> Step | Halt:
-        """Turn a little about the start; less after each turn that lost the targets."""
-        first = not situation.stations and not situation.counted
-        random, failures = self._random(situation), len(situation.counted)
-        start = np.array(self._start.joints_rad)
-        spread = START_SPREAD_RAD * START_SHRINK**failures * random.standard_normal((STARTS, len(start)))
-        drawn = start[np.newaxis] if first else start + spread
-        reached = self._reached(situation, drawn, np.zeros(len(drawn)))
-        if not reached:
+        """Turn a little about the start; less, and the other way, after a turn that lost a target."""
+        stations = situation.stations
+        seen = [{(one.camera, one.target) for one in station.views} for station in stations]
+        whole = [k for k, pairs in enumerate(seen) if pairs >= seen[0]]
+        # Stations that lost some of what was seen at first are kept, and are failures of the turn.
+        lost = len(stations) - 1 - whole[-1] if stations else 0
+        tilts = [
+            largest_tilt_rad(one.view, self._cameras[one.camera].camera)
+            for station in stations[:1]
+            for one in station.views
+        ]
+        found = starting_goal(
+            self._start,
+            len(whole),
+            lost + len(situation.counted),
+            min(tilts, default=0.0),
+            body_of(self._arm, self._workspace, self._solids, situation.believed),
+            situation.standing(self._start),
+        )
+        if found is None:
+            blind = [name for name in self._cameras if all(name != c for pairs in seen for c, _ in pairs)]
             return Halt(
                 EndReason.NO_START,
-                "no safe pose left around where the arm stood; workspace or joint limits are too near",
+                f"not tied to the arm by turns about where it stands: {', '.join(blind or self._cameras)}; "
+                "drive it to where every camera sees a target, away from the ends of the workspace and of "
+                "the joints, and begin again",
             )
-        return self._step(situation, drawn[reached[0]], "start", {})
+        pose, joints = found
+        goal = Goal(situation.label("station"), pose, tuple(joints.tolist()), self._wish.speed_rad_s)
+        return Step(goal, "start", {}, None, believed=situation.believed)
 
     def _planned(self, situation: RigSituation, believed: RigEstimate) -> Step | Halt:
         random = self._random(situation)

@@ -63,6 +63,7 @@ class RigPrepared:
         chooser = RigChooser(
             cell.arm,
             cell.workspace,
+            self.recording.cameras,
             self.start,
             configuration.wish(),
             cell.solids,
