@@ -130,7 +130,7 @@ def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
 
 
 def test_demo_of_a_rig(handeye: Handeye, tmp_path: Path) -> None:
-    compare("handeye demo --rig", handeye.json("demo", "--rig", tmp_path / "rig"))
+    compare("handeye run --rig", handeye.json("demo", "--rig", tmp_path / "rig"))
 
 
 def test_demo_of_a_folder(handeye: Handeye, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

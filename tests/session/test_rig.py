@@ -55,7 +55,7 @@ def test_a_run_that_is_killed_goes_on_as_if_nothing_had_been(
 
 def test_what_a_break_leaves_of_the_recording_is_made_again(finished: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(finished, tmp_path / "s"))
-    lost = next((folder / "corners").glob("station_03.left.*"))
+    lost = next((folder / "corners").glob("station_03.*"))
     content = lost.read_bytes()
     lost.unlink()
     open_rig_session(folder).close()
@@ -67,7 +67,7 @@ def test_what_a_break_leaves_of_the_recording_is_made_again(finished: Path, tmp_
 
 def test_what_was_edited_is_refused(finished: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(finished, tmp_path / "s"))
-    corners = next((folder / "corners").glob("station_03.left.*"))
+    corners = next((folder / "corners").glob("station_03.*"))
     good, table = corners.read_text(), folder / "recording.toml"
     number = good.split(",")[3]
     corners.write_text(good.replace(number, str(float(number) + 5), 1))
@@ -148,5 +148,7 @@ def test_cameras_that_do_not_move_against_the_arm_alone_are_no_start(tmp_path: P
     blind = replace(RIG, most_views=4, simulation=Simulation(faults=FaultRates(not_found=1.0)))
     end = run_rig(blind, tmp_path / "s")
     assert end.reason in {EndReason.TOO_MANY_FAILURES, EndReason.NO_START}
-    failures = {entry.failure for entry in open_rig_session(tmp_path / "s").entries}
+    store = open_rig_session(tmp_path / "s")
+    store.close()
+    failures = {entry.failure for entry in store.entries}
     assert failures == {Failure.NOT_FOUND}

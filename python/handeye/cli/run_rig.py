@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
 from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.estimation.confidence import Within
 from handeye.robots.protocol import Goal
 from handeye.session.deciding import EndReason
 from handeye.session.observer import Observer
@@ -103,9 +104,14 @@ def _answer(folder: Path, prepared: RigPrepared, end: RigEnd) -> Answer:
             f"{end.sentence}; the stations do not determine the answer", code=end.reason, hint=hint
         )
     run = judged(prepared, end)
-    error = {
-        name: {"translation_mm": run.error_mm[name], "rotation_deg": run.error_deg[name]}
-        for name in run.error_mm
+
+    def told(name: str, within: Within) -> dict[str, Any]:
+        error = {"translation_mm": run.error_mm[name], "rotation_deg": run.error_deg[name]}
+        return {"within_95": within.to_dict(), "true_error": error}
+
+    cameras = {name: told(name, calibration.estimate.of_camera(name).within_95) for name in run.cameras}
+    between = {
+        f"T_{a}_{b}": told(f"{a}_{b}", one.within_95) for (a, b), one in calibration.camera_to_camera.items()
     }
     data: dict[str, Any] = {
         "session": str(folder),
@@ -114,9 +120,10 @@ def _answer(folder: Path, prepared: RigPrepared, end: RigEnd) -> Answer:
         "request_met": end.reason is EndReason.ACCURACY_REACHED,
         "stations": end.stations,
         "attempts": end.attempts,
-        "true_error": error,
+        "cameras": cameras,
+        "camera_to_camera": between,
         "seed": prepared.configuration.seed,
-        **calibration.to_dict(),
+        "calibration": calibration.to_dict(),
     }
 
     def show(console: "Console") -> None:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate
@@ -117,20 +118,12 @@ class ViewConstraints:
 
     def _bad_views(self, joints: FloatArray) -> Sequence[str | None]:
         estimate = self.estimate
-        poses = estimate.X.matrix @ self.motions(joints) @ estimate.Y.matrix
-        middle = poses[:, :3, :3] @ estimate.target.points.mean(axis=0) + poses[:, :3, 3]
-        distance = np.linalg.norm(middle, axis=1)
-        cosine = np.einsum("ki,ki->k", poses[:, :3, 2], middle) / np.maximum(distance, 1e-9)
-        near, far = self.limits.distance_m
-        answers: list[str | None] = []
-        for length, toward in zip(distance, cosine, strict=True):
-            if not near <= length <= far:
-                answers.append("too near to the target or too far from it")
-            elif toward < np.cos(self.limits.tilt_rad):
-                answers.append("the target would be seen too obliquely")
-            else:
-                answers.append(None)
-        return answers
+        far, oblique = out_of_limits(estimate, self.motions(joints), self.limits)
+        said = ("too near to the target or too far from it", "the target would be seen too obliquely")
+        return [
+            said[0] if away else said[1] if tilted else None
+            for away, tilted in zip(far, oblique, strict=True)
+        ]
 
     def _hidden(self, joints: FloatArray) -> Sequence[str | None]:
         why = obstacles(self.estimate, self.motions(joints), self.sight)
@@ -142,6 +135,18 @@ class ViewConstraints:
         to_failed = _distances(joints, self.shunned)
         radius = 0.5 * _distances(self.shunned, self.taken).min(axis=1)
         return [NEAR_FAILURE if near else None for near in (to_failed < radius).any(axis=1)]
+
+
+def out_of_limits(
+    estimate: Estimate, motions: FloatArray, limits: ViewLimits
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell for motions (N, 4, 4) where the target is too near or too far (N,), and where seen too obliquely."""
+    poses = estimate.X.matrix @ motions @ estimate.Y.matrix
+    middle = poses[:, :3, :3] @ estimate.target.points.mean(axis=0) + poses[:, :3, 3]
+    distance = np.linalg.norm(middle, axis=1)
+    cosine = np.einsum("ki,ki->k", poses[:, :3, 2], middle) / np.maximum(distance, 1e-9)
+    near, far = limits.distance_m
+    return (distance < near) | (distance > far), cosine < np.cos(limits.tilt_rad)
 
 
 def sight_of(estimate: Estimate, limits: ViewLimits) -> Sight:

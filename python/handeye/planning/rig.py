@@ -16,7 +16,7 @@ from handeye.errors import InputError
 from handeye.estimation import Estimate, RigEstimate
 from handeye.estimation.confidence import Within
 from handeye.planning.candidates import Pool
-from handeye.planning.constraints import corners_at
+from handeye.planning.constraints import ViewLimits, corners_at, out_of_limits
 from handeye.planning.prediction import Prediction, Sight
 from handeye.planning.visibility import obstacles
 from handeye.types.arrays import FloatArray
@@ -124,6 +124,7 @@ def rig_gains(
     pool: Pool,
     wanted: Mapping[tuple[str, ...], float],
     sight: Sight | None = None,
+    limits: ViewLimits | None = None,
 ) -> RigGains:
     """Gain of every candidate for what is wanted: `RigRequest.missing`, or all cameras where that is empty.
 
@@ -137,6 +138,8 @@ def rig_gains(
         Cameras, or two in each other, by their names.
     sight
         What a camera must see of a target.
+    limits
+        From how far and how obliquely; None for any.
 
     Raises
     ------
@@ -162,6 +165,8 @@ def rig_gains(
     for pair, one in pairs.items():
         # What the arm adds is weighed for those on the short list only.
         gains = Prediction(_without_arm(one), sight).gains(criterion, motions[one.mounting])
+        if limits is not None:
+            gains[np.logical_or(*out_of_limits(one, motions[one.mounting], limits))] = np.nan
         visible[pair] = np.isfinite(gains)
         # A camera that is good enough still helps others a little, through the arm and the board.
         sums += np.nan_to_num(gains) * (1.0 if pair[0] in needed else 0.1)

@@ -12,6 +12,7 @@ import numpy as np
 from handeye.estimation import RigEstimate
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Workspace
+from handeye.planning.constraints import ViewLimits
 from handeye.planning.prediction import Sight
 from handeye.planning.rig import FEWEST_STATIONS, RigRequest, rig_gains
 from handeye.planning.solids import SolidLinks
@@ -24,11 +25,12 @@ from handeye.session.wish import Wish
 from handeye.types import MountedCamera, Pose, Station
 from handeye.types.arrays import FloatArray
 
-# Postures are drawn this far about those of the stations.
-SPREAD_RAD = 0.25
+# Postures are drawn about those of the stations, some near and some far.
+SPREADS_RAD = (0.1, 0.8)
 # Candidates whose straight path is looked at.
 MOST_PATHS = 24
-MARGIN_PX = 25.0
+# What a belief may be off in the image.
+SAFETY_PX = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,8 @@ class RigChooser:
         The shapes of the links; None to judge them by capsules.
     candidates
         Postures drawn at every step.
+    limits
+        What makes a view usable.
     """
 
     def __init__(
@@ -76,11 +80,14 @@ class RigChooser:
         solids: SolidLinks | None = None,
         *,
         candidates: int,
+        limits: ViewLimits,
     ) -> None:
         self._arm, self._workspace, self._solids = arm, workspace, solids
         self._cameras, self._start, self._wish = cameras, start, wish
         self._request = request_of(wish)
         self._candidates = candidates
+        self._limits = limits
+        self._sight = Sight(margin_px=limits.margin_px + SAFETY_PX, fewest=limits.fewest)
 
     @property
     def kinematics(self) -> ArmKinematics | None:
@@ -150,7 +157,8 @@ class RigChooser:
         random = self._random(situation)
         known = np.array([situation.joints(station) for station in situation.stations])
         around = known[random.integers(0, len(known), self._candidates)]
-        joints = around + SPREAD_RAD * random.standard_normal(around.shape)
+        spread = random.uniform(*SPREADS_RAD, (len(around), 1))
+        joints = around + spread * random.standard_normal(around.shape)
         body = body_of(self._arm, self._workspace, self._solids, believed)
         joints = joints[[self._arm.within_limits(q) for q in joints]]
         joints = joints[np.array([why is None for why in body.obstacles(joints)], dtype=bool)]
@@ -162,7 +170,7 @@ class RigChooser:
             )
         )
         missing = {} if self._request is None else self._request.missing(believed)
-        found = rig_gains(believed, pool, missing, Sight(margin_px=MARGIN_PX))
+        found = rig_gains(believed, pool, missing, self._sight, self._limits)
         reached = self._reached(situation, joints, -np.nan_to_num(found.gains, nan=-np.inf))
         reached = [i for i in reached if np.isfinite(found.gains[i])]
         if not reached:

@@ -68,6 +68,7 @@ class RigPrepared:
             configuration.wish(),
             cell.solids,
             candidates=(configuration.rig or RigSettings()).candidates,
+            limits=configuration.limits,
         )
         return RigSession(cell, store, chooser)
 
