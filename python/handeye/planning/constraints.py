@@ -140,7 +140,7 @@ class ViewConstraints:
 def out_of_limits(
     estimate: Estimate, motions: FloatArray, limits: ViewLimits
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Tell for motions (N, 4, 4) where the target is too near or too far (N,), and where seen too obliquely."""
+    """Tell for motions (N, 4, 4) where a target is too near or too far (N,), and where seen obliquely."""
     poses = estimate.X.matrix @ motions @ estimate.Y.matrix
     middle = poses[:, :3, :3] @ estimate.target.points.mean(axis=0) + poses[:, :3, 3]
     distance = np.linalg.norm(middle, axis=1)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handeye.errors import InputError
+from handeye.robots import ArmKinematics, open_arm
 from handeye.robots.simulated import SimulatedArm
 from handeye.session.attempt import Cell
 from handeye.session.configuration import left_at
@@ -21,7 +22,9 @@ from handeye.session.settings import (
     settings_of,
 )
 from handeye.session.starting import Start
+from handeye.session.store import is_session
 from handeye.types import RigRecording, RigTruth
+from handeye.types.kinematics import Kinematics
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +120,25 @@ def go_on_rig(
         store.close()
         raise
     return session, store, prepared
+
+
+def arm_of_rig(folder: Path) -> Kinematics | None:
+    """Return the arm of a session of several cameras, as its estimate knew it; None for other recordings.
+
+    Raises
+    ------
+    InputError
+        The session was changed, or its arm is not what it was.
+    """
+    if not is_session(folder) or not is_rig_session(folder):
+        return None
+    settings = read_settings(folder).asked
+    configuration = Configuration.from_dict(settings.get("configuration"))
+    if configuration.robot is None or not configuration.joints_err or not read_start(settings).posture_known:
+        return None
+    arm = open_arm(configuration.robot)
+    check_fingerprints(settings, fingerprints(arm, None))
+    return ArmKinematics(arm)
 
 
 def is_rig_session(folder: Path) -> bool:

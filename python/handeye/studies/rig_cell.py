@@ -10,6 +10,7 @@ from handeye.cameras.protocol import Frame, ImageSource, Points
 from handeye.errors import InputError
 from handeye.planning.collisions import Body as ArmBody
 from handeye.planning.collisions import Workspace
+from handeye.planning.constraints import ViewLimits
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Robot
 from handeye.robots.simulated import SimulatedArm
@@ -27,6 +28,8 @@ from handeye.types.arrays import FloatArray
 __all__ = ["ARM", "rig_cell"]
 # Places to begin from, of which the first that is free is taken.
 STARTS = 8
+# The cameras beside the arm stand farther from the target on it than is usual.
+LIMITS = ViewLimits((0.25, 1.8), float(np.deg2rad(60.0)))
 
 
 class RigCamera:
@@ -114,7 +117,9 @@ def rig_cell(
         {name: rig.camera_poses[name].inverse() for name in names},
         {name: rig.target_poses[name] for name in targets},
     )
-    return RigPrepared(replace(configuration, robot=ARM), cell, start, recording, truth, hidden)
+    limits = LIMITS if configuration.limits == ViewLimits() else configuration.limits
+    asked_of = replace(configuration, robot=ARM, limits=limits)
+    return RigPrepared(asked_of, cell, start, recording, truth, hidden)
 
 
 def _surrounding(arm: Arm) -> Workspace:
