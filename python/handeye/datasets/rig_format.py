@@ -288,7 +288,7 @@ def _stations(
     views: dict[str, list[_ViewDocument]] = {station.name: [] for station in document.station}
     for one in document.view:
         if one.station not in views:
-            raise InputError(f"view of {one.station[:60]!r}: no such station", code="invalid_field")
+            raise InputError(f"view of {one.station[:60]!r}: no such station or camera", code="invalid_field")
         views[one.station].append(one)
     return tuple(_station(station, views[station.name], cameras, root) for station in document.station)
 
@@ -302,7 +302,7 @@ def _station(
     for one in seen:
         where = f"station {station.name[:60]}, camera {one.camera[:60]}"
         if one.camera not in cameras:
-            raise InputError(f"{where}: no such camera", code="invalid_field")
+            raise InputError(f"{where}: no such station or camera", code="invalid_field")
         ids, pixels, sigmas = read_corners(inside(root, one.corners, f"{where}: corners"))
         view = View(
             station.name,

@@ -59,12 +59,10 @@ class RigValidation:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON: the same keys for every camera, and for cameras in each other."""
-        stated = {
-            **{
-                name: self.calibration.estimate.of_camera(name).within_95 for name in self.calibration.cameras
-            },
-            **{f"T_{a}_{b}": one.within_95 for (a, b), one in self.calibration.camera_to_camera.items()},
-        }
+        of_camera = self.calibration.estimate.of_camera
+        between = self.calibration.camera_to_camera
+        stated = {name: of_camera(name).within_95 for name in self.calibration.cameras}
+        stated |= {f"T_{a}_{b}": one.within_95 for (a, b), one in between.items()}
         told = {
             name: {
                 "within_95": radii.to_dict(),
