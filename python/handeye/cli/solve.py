@@ -70,8 +70,8 @@ def solve(
     """
     check_output(output)
     if source.only is None and is_rig(folder):
-        if certify or page.ui:
-            raise UsageError("--certify and --ui take one camera", hint="leave them out for several")
+        if page.ui:
+            raise UsageError("--ui takes one camera", hint="leave it out for several")
         rig = source.open_rig(folder)
         views = [station.views[0].view for station in rig.recording.stations]
         return answer_for_rig(
@@ -81,6 +81,7 @@ def solve(
             reduced=reduced,
             kinematics=arm.kinematics(views, model),
             camera_fixed=camera_fixed,
+            certify=certify,
         )
     opened = source.open_any(folder, arm.described())
     if isinstance(opened, PosePairs):

@@ -34,10 +34,12 @@ def policies(
 ) -> Answer:
     """Compare policies in the same simulated cells: the same start, budget and noise.
 
-    Ours one view after another and all at once, the paper's two baselines, the fixed moves of other tools, a
+    Ours as `handeye run` drives, one view after another from a pool and all at once, the paper's two
+    baselines from the pool and from the candidates of `handeye run`, the fixed moves of other tools, a
     lattice driven to and fro, and poses as people choose them. What each brings is solved alike, by the
-    default with the arm described. Beside each mean stands how many times the error of the first row it is
-    (geometric mean over the cells), and its 95 % interval.
+    default with the arm described, and measured several times with all noise drawn again. Beside each mean
+    stands how many times the error of the first row it is (geometric mean over the cells), and its 95 %
+    interval.
 
     Parameters
     ----------

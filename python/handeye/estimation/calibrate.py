@@ -7,7 +7,7 @@ import numpy as np
 from handeye.errors import DegenerateError
 from handeye.estimation.auto import AutoEstimator, AutoOptions
 from handeye.estimation.estimate import Estimate, Estimator, regular_information
-from handeye.estimation.faults import Examination, examine
+from handeye.estimation.faults import Examination, examine, measured
 from handeye.estimation.initialize import check_views
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.paper import paper_estimate
@@ -85,9 +85,8 @@ def solve(
     >>> 1e3 * calibration.sigma_translation_m < 0.1  # mm
     True
     """
-    measurements = Measurements.of_recording(recording)
     return calibrate(
-        measurements,
+        measured(recording),
         ModelName(model),
         reduced=reduced,
         kinematics=kinematics,

@@ -113,6 +113,11 @@ impl Cell {
         }
     }
 
+    /// Whether all poses were measured by detectors of somebody else, without pictures.
+    pub(super) fn is_unseen(&self) -> bool {
+        self.measurements.iter().all(|m| m.pose.is_foreign)
+    }
+
     /// # Errors
     /// [`Error::InvalidInput`] naming what does not fit.
     pub(super) fn check(&self) -> Result<(), Error> {

@@ -11,6 +11,7 @@
 //! (average information), Rue, Martino and Chopin 2009 (nested Laplace), Huber 1967 and White 1980 (sandwich).
 
 mod agreement;
+mod assembly;
 mod cell;
 mod cell_start;
 mod component;

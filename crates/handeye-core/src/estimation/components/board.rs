@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Component;
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// The scale of every board, relative to one.
 pub(in crate::estimation) struct BoardScale;
@@ -20,7 +20,7 @@ impl Component for BoardScale {
         vec![Level {
             name: "board_scale",
             start: 1e-4,
-            prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.1, nothing: 1e-6 },
+            prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.1, tail: 1.0, nothing: 1e-6 },
         }]
     }
 

@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::{Arm, Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// Offsets of the joints between the first and the last, which only say where base and flange are.
 pub(in crate::estimation) struct JointOffsets {
@@ -29,7 +29,12 @@ impl Component for JointOffsets {
         vec![Level {
             name: "offset_rad",
             start: 0.01 * degree,
-            prior: LevelPrior::Deviation { size: 0.05 * degree, exponent: 0.25, nothing: 1e-4 * degree },
+            prior: LevelPrior::Deviation {
+                size: 0.07 * degree,
+                exponent: 0.35,
+                tail: 1.0,
+                nothing: 1e-6 * degree,
+            },
         }]
     }
 

@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::{Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::{Linearisation, Rows};
-use crate::estimation::mixed::{Effect, Term};
 
 /// Flange poses further apart than this have little of an error in common; a chord of 2 is half a turn.
 const LIKENESS_M: f64 = 1.0;
@@ -29,11 +29,15 @@ struct Beliefs {
 }
 
 /// Wrists are short, and what they hide is small.
-const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.2, lever_m: 0.4 };
+const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.26, lever_m: 0.4 };
 /// Shoulders and mountings carry the whole reach.
-const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.4, lever_m: 1.0 };
+const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.6, lever_m: 1.0 };
+/// Of an arm that is known by a list of poses alone nobody has said that it was ever calibrated, and its pictures, which
+/// would tell what is the detector's, are not there.
+const AT_FLANGE_UNSEEN: Beliefs = Beliefs { size_deg: 0.16, ..AT_FLANGE };
+const AT_BASE_UNSEEN: Beliefs = Beliefs { size_deg: 0.08, ..AT_BASE };
 /// Functions that carry less of the variance than this count as each station's own.
-const SMALLEST_FUNCTION: f64 = 0.01;
+const SMALLEST_FUNCTION: f64 = 1e-4;
 /// So do all but the largest: where stations have little in common there are as many functions as stations, and each
 /// says as little as noise of its own.
 const MOST_FUNCTIONS: usize = 6;
@@ -59,16 +63,20 @@ impl Posture {
             cell,
             "posture_flange",
             ["posture_flange_rad", "posture_flange_lever_m"],
-            &AT_FLANGE,
+            if cell.is_unseen() { &AT_FLANGE_UNSEEN } else { &AT_FLANGE },
             |rows| &rows.flange,
         )
     }
 
     /// At the base.
     pub fn base(cell: &Cell) -> Self {
-        Self::new(cell, "posture_base", ["posture_base_rad", "posture_base_lever_m"], &AT_BASE, |rows| {
-            &rows.base
-        })
+        Self::new(
+            cell,
+            "posture_base",
+            ["posture_base_rad", "posture_base_lever_m"],
+            if cell.is_unseen() { &AT_BASE_UNSEEN } else { &AT_BASE },
+            |rows| &rows.base,
+        )
     }
 
     fn new(
@@ -119,7 +127,8 @@ impl Component for Posture {
                 prior: LevelPrior::Deviation {
                     size: self.beliefs.size_deg * degree,
                     exponent: self.beliefs.exponent,
-                    nothing: 1e-4 * degree,
+                    tail: 2.0,
+                    nothing: 1e-6 * degree,
                 },
             },
             Level {

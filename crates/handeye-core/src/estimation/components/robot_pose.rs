@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::{Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::{Linearisation, Rows};
-use crate::estimation::mixed::{Effect, Term};
 
 /// White noise of the robot's poses: rotation, and translation as rotation times a lever.
 pub(in crate::estimation) struct RobotPose {
@@ -38,7 +38,12 @@ impl Component for RobotPose {
             Level {
                 name: self.levels[0],
                 start: 0.004 * degree,
-                prior: LevelPrior::Deviation { size: 0.02 * degree, exponent: 0.02, nothing: 1e-4 * degree },
+                prior: LevelPrior::Deviation {
+                    size: 0.02 * degree,
+                    exponent: 0.02,
+                    tail: 1.0,
+                    nothing: 1e-6 * degree,
+                },
             },
             Level { name: self.levels[1], start: 1.0, prior: LevelPrior::Ratio { spread: 0.7 } },
         ]

@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::{Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// One lag for all pictures, seconds.
 pub(in crate::estimation) struct TimeLag;
@@ -27,7 +27,7 @@ impl Component for TimeLag {
         vec![Level {
             name: "lag_s",
             start: 1e-3,
-            prior: LevelPrior::Deviation { size: 0.05, exponent: 0.02, nothing: 1e-6 },
+            prior: LevelPrior::Deviation { size: 0.05, exponent: 0.02, tail: 1.0, nothing: 1e-6 },
         }]
     }
 
