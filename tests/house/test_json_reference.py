@@ -117,6 +117,8 @@ def test_solve_several_cameras(handeye: Handeye, tmp_path: Path) -> None:
         camera["target"] = target
     compare("handeye solve, several cameras", data)
     compare("handeye plan, several cameras", handeye.json("plan", tmp_path / "rig"))
+    halved = handeye.json("validate", tmp_path / "rig", "--splits", "2")
+    compare("handeye validate, several cameras", halved)
 
 
 def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
