@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
 from handeye.cli.output import write_json
@@ -40,12 +40,13 @@ def answer_for_rig(
         raise InputError("the paper's model has one camera", code="several_cameras", hint="leave --model out")
     with mindful_of(opened.warnings):
         found = validate_rig(opened.recording, splits=splits, seed=seed, kinematics=kinematics)
-    data = {
+    warnings = [*map(str, opened.warnings), *found.calibration.warnings]
+    data: dict[str, Any] = {
         "recording": opened.recording.name,
         "stations": len(opened.recording),
         "seed": seed,
         **found.to_dict(),
-        "warnings": [*map(str, opened.warnings), *found.calibration.warnings],
+        "warnings": warnings,
     }
     if output is not None:
         write_json(output, data)
@@ -66,6 +67,6 @@ def answer_for_rig(
                     rows.append((words, f"{_pair(one[what], figures)}, NEES/6 {nees} (ideal 1)"))
             console.print(name)
             pairs(console, rows, indent=2)
-        notices(console, "Warnings", data["warnings"])
+        notices(console, "Warnings", warnings)
 
     return Answer(data, show)

@@ -124,15 +124,10 @@ def validate_rig(
     differences: dict[str, list[RigDifference]] = {name: [] for name in names}
     undetermined = 0
     for _ in range(splits):
-        order = random.permutation(count)
+        order: list[int] = random.permutation(count).tolist()
         try:
             one, other = (
-                _answers(
-                    solve_rig(
-                        recording.with_stations(recording.stations[i] for i in sorted(half)),
-                        kinematics=kinematics,
-                    )
-                )
+                _answers(solve_rig(_part(recording, half), kinematics=kinematics))
                 for half in (order[: count // 2], order[count // 2 :])
             )
         except (InputError, DegenerateError, SolveError):
@@ -148,6 +143,10 @@ def validate_rig(
         splits,
         undetermined,
     )
+
+
+def _part(recording: RigRecording, numbers: list[int]) -> RigRecording:
+    return recording.with_stations(recording.stations[i] for i in sorted(numbers))
 
 
 def _answers(calibration: RigCalibration) -> dict[str, Stated]:
