@@ -91,7 +91,7 @@ def test_plan_ranks_stations_by_what_all_cameras_learn(handeye: Handeye, folder:
 
 
 def test_other_commands_take_one_of_the_cameras(handeye: Handeye, folder: Path) -> None:
-    error = handeye.fails("validate", folder)
+    error = handeye.fails("doctor", folder)
     assert error["code"] == "several_cameras"
     assert "--only" in error["hint"]
     alone = handeye.json("solve", folder, "--only", "front")
