@@ -530,6 +530,9 @@ class Chain:
     def forward(self, joints: ArrayLike) -> NDArray[float64]:
         """`T_base_flange` (N, 4, 4) at joints (N, n)."""
 
+    def frames(self, joints: ArrayLike) -> NDArray[float64]:
+        """Poses (N, n + 2, 4, 4) in the base at joints (N, n): the base itself, each joint, the flange."""
+
     def jacobians(self, joints: ArrayLike, frame: str) -> NDArray[float64]:
         """Twists (N, 6, n) per joint.
 
@@ -570,6 +573,15 @@ class Chain:
         attempts: int = 100,
     ) -> NDArray[float64]:
         """All different joints (S, n) found that reach a pose (4, 4)."""
+
+def least_gaps(
+    points: ArrayLike, pairs: list[tuple[int, int, int, int]], radii: list[float]
+) -> NDArray[float64]:
+    """Least gap (N,) in metres of pairs of capsules; negative where two overlap, infinite without pairs.
+
+    The ends of both capsules of a pair are among the points (N, P, 3) of a posture; `radii` are the sums of
+    the radii of each pair. Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
+    """
 
 # Several views at once
 

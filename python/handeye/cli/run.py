@@ -14,7 +14,7 @@ from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder
 from handeye.cli.page import Live, Page
 from handeye.cli.run_answer import judged_by, run_answer
-from handeye.cli.run_options import Lens, Limits, Rig, Simulated, Timeouts
+from handeye.cli.run_options import Lens, Limits, Rig, Simulated, TimeoutOptions
 from handeye.cli.run_rig import check_rig, resume_rig, run_rig
 from handeye.cli.work import WorkOptions, check_touch
 from handeye.datasets import read_camera, read_target
@@ -65,11 +65,12 @@ def run(
     policy: str = "next_best_view",
     refine: bool = True,
     resume: bool = False,
+    anyway: bool = False,
     dry_run: bool = False,
     confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen, like those below
     work: WorkOptions = WorkOptions(),  # noqa: B008
-    timeouts: Timeouts = Timeouts(),  # noqa: B008
+    timeouts: TimeoutOptions = TimeoutOptions(),  # noqa: B008
     unknown: Lens = Lens(),  # noqa: B008
     several: Rig = Rig(),  # noqa: B008
     simulated: Simulated = Simulated(),  # noqa: B008
@@ -121,6 +122,9 @@ def run(
         Climb from the best candidates to better ones near them; without it the best that was drawn is taken.
     resume
         Go on with a session; everything else is taken from it.
+    anyway
+        Go on where the accuracy is out of reach. Else a run ends where, from five views on, even 40 would not
+        come near it, and says what they would come to.
     dry_run
         Show what would be done first; nothing moves and nothing is written.
     confirm
@@ -165,7 +169,7 @@ def run(
             float(np.deg2rad(limits.tilt_deg)),
             limits.margin_px,
         ),
-        patience=timeouts.patience(driver, images),
+        timeouts=timeouts.timeouts(driver, images),
         camera_known=not (unknown.uncalibrated and driver == SIMULATED),
         lens=unknown.lens,
         accuracy_px=unknown.accuracy_px,
@@ -173,6 +177,7 @@ def run(
         touch_mm=touch_mm,
         work=work.work(),
         rig=several.settings(),
+        anyway=anyway,
     )
     _check(configuration, given=(camera, target, mounting) != (None, None, None), shown=page.ui or dry_run)
     if not dry_run:

@@ -178,9 +178,7 @@ class ArmChooser:
                     more["refined"] = climbed[name]
                 pose = answer.candidate.T_base_flange
                 goal = self._goal(situation, pose, tuple(joints_of[name].tolist()))
-                considered = Considered(
-                    planner.pool, planner.gains(), self._arm.forward(drawn.ruled_out), drawn.reasons
-                )
+                considered = Considered(planner.pool, planner.gains(), drawn.ruled_out, drawn.reasons)
                 return Step(
                     goal, "plan", decision_of(answer, estimate, more), estimate, considered=considered
                 )

@@ -21,7 +21,8 @@ from typing import IO, Any, Self, TypeVar
 
 from handeye.datasets import write_recording
 from handeye.datasets.reading import existing_folder, is_file, reason
-from handeye.datasets.recording_format import ViewsApart, read_views_apart, write_empty_recording
+from handeye.datasets.recording_format import ViewsApart, read_views_apart
+from handeye.datasets.recording_writing import RecordingFolder, write_empty_recording
 from handeye.datasets.writing import new_folder, remove_partials, replace_file, write_file
 from handeye.errors import InputError, OutputError
 from handeye.session.entry import Entry, views_of
@@ -148,6 +149,7 @@ class SessionStore(Store):
 
     begun_with: Recording
     _recording: Recording
+    _on_disk: RecordingFolder
 
     @property
     def recording(self) -> Recording:
@@ -179,6 +181,7 @@ class SessionStore(Store):
             check_same(path, kept.to_dict() == base.to_dict(), found.views, taken, same_view)
             current = is_current(found.views, views)
         store.begun_with, store._recording = base, store._grown(base)
+        store._on_disk = RecordingFolder(root)
         return store, current
 
     def _grown(self, recording: Recording) -> Recording:
@@ -210,7 +213,7 @@ class SessionStore(Store):
             The system refuses to write.
         """
         self._recording = replace(self._recording, truth=truth)
-        write_recording(self._recording, self.folder, replace=True)
+        self._on_disk.update(self._recording)
 
     def bring_up_to_date(self) -> None:
         """Write the recording that follows from the journal.
@@ -221,7 +224,7 @@ class SessionStore(Store):
             The system refuses to write.
         """
         self._recording = self._grown(self._recording)
-        write_recording(self._recording, self.folder, replace=True)
+        self._on_disk.update(self._recording)
 
 
 def create_session(folder: Path, recording: Recording, settings: Mapping[str, Any]) -> SessionStore:

@@ -3,10 +3,11 @@
 import time
 from dataclasses import dataclass, replace
 
+from handeye.datasets.png_writing import png_bytes
 from handeye.detection import Detection
 from handeye.errors import HandeyeError, OutputError, printable
 from handeye.estimation import Estimate, view_pose
-from handeye.session.attempt import Arrived, Cell, Eye, Missed, Seen, arrive, encoded, look
+from handeye.session.attempt import Arrived, Cell, Eye, Missed, Seen, arrive, look
 from handeye.session.deciding import Step
 from handeye.session.entry import Entry, Failure
 from handeye.session.judging import foreseen, labeled, objection, unchanged
@@ -78,7 +79,7 @@ class Taker:
             )
         digests = [one.seen.digest for one in taken] + [m.digest for _, m in missed if m.digest is not None]
         images = {
-            image_name(one.eye, one.view, several=bool(self._cell.several)): encoded(one.seen.image)
+            image_name(one.eye, one.view, several=bool(self._cell.several)): png_bytes(one.seen.image)
             for one in taken
             if one.seen.image is not None
         }
@@ -164,7 +165,7 @@ class Taker:
 
     def _write(self, entry: Entry, images: dict[str, bytes]) -> None:
         """Write an attempt down; where the disk refuses, wait and ask again before giving up."""
-        for patience in (1, 2, 0):
+        for pauses in (1, 2, 0):
             try:
                 if len(self._store.entries) >= entry.number:  # written, but the recording lagged behind
                     return
@@ -173,9 +174,9 @@ class Taker:
                 self._store.append(entry)
                 return
             except OutputError:
-                if patience == 0:
+                if pauses == 0:
                     raise
-                time.sleep(patience * _WRITE_PAUSE_S)
+                time.sleep(pauses * _WRITE_PAUSE_S)
 
 
 def image_name(eye: Eye, view: View, *, several: bool) -> str:

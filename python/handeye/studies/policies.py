@@ -20,7 +20,7 @@ from handeye.validation import metrics
 BUDGETS = (8, 12)
 START_VIEWS, SMALLEST_TURN_RAD = 3, np.deg2rad(5.0)
 ARMS: dict[str, ArmErrors] = {"exact": ArmErrors(), "realistic": usual_errors()}
-# How often the views of a policy are measured, all noise and the arm's errors drawn anew.
+# How often the views of a policy are measured, all noise and the arm's errors drawn again.
 DRAWS = 3
 Z_95 = 1.959964
 QUANTITIES = ("translation_mm", "rotation_deg")

@@ -104,7 +104,7 @@ def rig_cell(
         space,
         eyes[0].camera,
         eyes[0].target,
-        configuration.patience.without_clock(),
+        configuration.timeouts.without_clock(),
         confirm,
         speed_rad_s=configuration.speed_rad_s,
         observer=observer or Observer(),

@@ -13,7 +13,6 @@ from handeye.estimation import Estimate, Measurements
 from handeye.estimation.confidence import ellipsoid
 from handeye.estimation.estimate import corrected
 from handeye.robots import Arm
-from handeye.robots.frames import frames_of
 from handeye.robots.protocol import Goal, Reading
 from handeye.session.deciding import Considered
 from handeye.types import Camera, Mounting, Pose, Target, View
@@ -327,7 +326,7 @@ def _residuals(
 def _frames(arm: Arm | None, joints: Sequence[float] | None) -> list[list[float]] | None:
     if arm is None or joints is None or len(joints) != len(arm):
         return None
-    return _many(frames_of(arm, np.array(joints)[np.newaxis])[0])
+    return _many(arm.frames(np.array(joints)))
 
 
 def _listed(pixels: FloatArray) -> list[list[float]]:
