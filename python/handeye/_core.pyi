@@ -494,9 +494,13 @@ def estimate_cell(
     *,
     velocities: ArrayLike | None = None,
     arm: tuple[ArrayLike, ArrayLike, list[float], list[int], list[bool]] | None = None,
+    approach: ArrayLike | None = None,
     exact_robot: bool = False,
+    roughness: float = 1.0,
     board_scale: bool = False,
     start: tuple[ArrayLike, ArrayLike] | None = None,
+    tips: Sequence[tuple[bool, ArrayLike, ArrayLike]] = ...,
+    touches: Sequence[tuple[int, list[int], tuple[int, ArrayLike] | None, ArrayLike]] = ...,
     pairs: int,
     most_rounds: int,
 ) -> Posterior:
@@ -508,7 +512,12 @@ def estimate_cell(
     flange. `seen`: camera, target, its views, and for each of these its station and pixel variance in px^2.
     `velocities` (S, 6): twists of the flange per second. `arm`: twists (S, 6, n) of the flange per joint
     and (S, 6, m) per way of displacing a joint on its link, what a deviation of one means for each joint,
-    joints whose offset is a parameter, and which ways are in metres. `start`: X (C, 4, 4) and Y (T, 4, 4).
+    joints whose offset is a parameter, and which ways are in metres. `approach` (S, 6, n): twists of the
+    flange per joint and its play, by the side that it came from. `start`: X (C, 4, 4) and Y (T, 4, 4).
+    `roughness`: how many times larger hidden errors of the arm are believed to be than those of good arms.
+    A tip is whether it is on the flange, where (3,), and how well that is known, information (3, 3); three
+    parameters each behind those of the boards. A touch is its station, behind those of the pictures, one tip
+    or two, a target with the point (3,) of it, and the covariance (3, 3) of how well the two met.
     """
 
 # Kinematics

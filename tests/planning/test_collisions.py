@@ -47,6 +47,13 @@ def test_the_way_counts_as_well_as_its_ends() -> None:
     assert body.obstacle_on_path(left, down) == "the arm would touch the floor"
 
 
+def test_a_floor_is_a_number() -> None:
+    for values in ({"floor_m": np.nan}, {"link_radius_m": np.inf}, {"tool_radius_m": np.nan}):
+        with pytest.raises(InputError, match="floor at") as caught:
+            Workspace(np.zeros(3), np.ones(3), **values)
+        assert "floor as a number" in (caught.value.hint or "")
+
+
 def test_a_workspace_has_an_inside() -> None:
     with pytest.raises(InputError):
         Workspace(np.zeros(3), np.array([1.0, 1.0, 0.0]))

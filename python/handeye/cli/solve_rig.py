@@ -1,10 +1,13 @@
 """The answer of `handeye solve` for several cameras."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
+from handeye.cli.arm import ArmSource
 from handeye.cli.output import write_json
+from handeye.cli.page import Page, serve, show_rig
 from handeye.cli.source import mindful_of
 from handeye.errors import InputError
 from handeye.estimation import RigCalibration, solve_rig
@@ -26,7 +29,9 @@ def answer_for_rig(
     reduced: bool,
     kinematics: Kinematics | None,
     camera_fixed: bool,
-    certify: bool = False,
+    certify: bool,
+    page: Page,
+    arm: ArmSource,
 ) -> Answer:
     """Solve all cameras in one estimate, and certify it where that is asked for.
 
@@ -45,7 +50,12 @@ def answer_for_rig(
         data["certificate"] = certificate.to_dict()
     if output is not None:
         write_json(output, data)
-    return Answer(data, lambda console: _show(console, opened, rig, certificate, output))
+    after = None if not page.ui else partial(_page, page, opened, rig, arm)
+    return Answer(data, lambda console: _show(console, opened, rig, certificate, output), after)
+
+
+def _page(page: Page, opened: OpenedRig, rig: RigCalibration, arm: ArmSource) -> None:
+    serve(show_rig(page, opened, rig, arm=arm.described(), description=arm.robot))
 
 
 def rig_data(opened: OpenedRig, rig: RigCalibration) -> dict[str, Any]:

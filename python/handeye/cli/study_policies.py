@@ -14,6 +14,7 @@ from handeye.cli.study import Trials, write_results
 from handeye.types.mounting import Mounting
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import Console
     from rich.table import Table
 
@@ -61,7 +62,8 @@ def policies(
             progress=advance,
         )
     document = result.to_dict()
-    written = write_results(trials.output, f"policies_{arm.value}", document, lambda: ())
+    name = f"policies_{arm.value}"
+    written = write_results(trials.output, name, document, lambda: _policies_picture(name, document))
     return Answer(document, lambda console: _show_policies(console, document, written))
 
 
@@ -108,6 +110,12 @@ def gains(
     document = result.to_dict()
     written = write_results(trials.output, f"gains_{mounting.value}_{arm.value}", document, lambda: ())
     return Answer(document, lambda console: _show_gains(console, document, written))
+
+
+def _policies_picture(name: str, document: dict[str, Any]) -> "list[tuple[str, Figure]]":
+    from handeye.studies.policies_picture import draw_policies  # noqa: PLC0415 - only where one is asked for
+
+    return [(name, draw_policies(document))]
 
 
 def _show_policies(console: "Console", document: dict[str, Any], written: list[Path]) -> None:

@@ -55,7 +55,12 @@ class Workspace:
         lower = finite_array(self.lower_m, (3,), "workspace: lower_m")
         upper = finite_array(self.upper_m, (3,), "workspace: upper_m")
         radii = self.link_radius_m, self.tool_radius_m
-        finite_array([self.floor_m, *radii], (3,), "workspace: floor and radii")
+        if not np.isfinite([self.floor_m, *radii]).all():
+            raise InputError(
+                f"workspace: floor at {self.floor_m} m, radii of {radii[0]} and {radii[1]} m",
+                code="not_finite",
+                hint="state the height of table or floor as a number",
+            )
         if (lower >= upper).any() or min(radii) < 0:
             raise InputError(
                 f"workspace: from {lower} to {upper}, expected a box with an inside, radii not negative",

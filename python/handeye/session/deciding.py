@@ -27,6 +27,7 @@ class EndReason(StrEnum):
     ACCURACY_REACHED = "accuracy_reached"
     VIEWS_TAKEN = "views_taken"
     NO_CANDIDATE = "no_candidate"
+    OUT_OF_REACH = "out_of_reach"
     NO_START = "no_start"
     TOO_MANY_FAILURES = "too_many_failures"
     ROBOT_HANGS = "robot_hangs"
@@ -89,12 +90,11 @@ class Attempts:
         if not start.posture_known:
             return None
         for entry in reversed(self.entries):
-            if entry.standing_rad is not None:
-                return entry.standing_rad
-            if entry.brought is not None:
-                return self.joints(entry.brought)
-            if entry.moved:
-                return entry.goal_joints
+            told = None if entry.brought is None else self.joints(entry.brought)
+            for joints in (entry.standing_rad, told, entry.goal_joints if entry.moved else None):
+                # Older sessions may hold readings that are not of this arm.
+                if joints is not None and len(joints) == len(start.joints_rad):
+                    return joints
         return start.joints_rad
 
     def too_many(self, most: int) -> "Halt | None":
@@ -195,6 +195,7 @@ def halt_of(stop: Stop) -> Halt:
     known = {
         StopReason.ACCURACY_REACHED: EndReason.ACCURACY_REACHED,
         StopReason.NO_CANDIDATE: EndReason.NO_CANDIDATE,
+        StopReason.OUT_OF_REACH: EndReason.OUT_OF_REACH,
     }
     return Halt(known.get(stop.reason, EndReason.VIEWS_TAKEN), stop.sentence)
 

@@ -95,6 +95,8 @@ class Configuration:
         Touch error to reach in place of the accuracy, and what is seen and touched.
     rig
         What there is to say of several cameras; None for one.
+    anyway
+        Go on although the accuracy is out of reach, see `Wish`.
     """
 
     robot: str | None
@@ -123,6 +125,7 @@ class Configuration:
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
     rig: RigSettings | None = None
+    anyway: bool = False
 
     @property
     def is_simulated(self) -> bool:
@@ -156,6 +159,7 @@ class Configuration:
             touch_mm=self.touch_mm,
             work=self.work,
             camera_to_camera=None if self.rig is None else self.rig.camera_to_camera,
+            anyway=self.anyway,
         )
 
     def workspace(self) -> Workspace:

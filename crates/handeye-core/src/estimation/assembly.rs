@@ -23,7 +23,7 @@ fn square(m: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Matrices of as many rows, row by row, padded to whole vectors.
-fn side_by_side(rows: usize, all: &[&DMatrix<f64>]) -> Vec<f64> {
+fn in_one(rows: usize, all: &[&DMatrix<f64>]) -> Vec<f64> {
     let across = all.iter().map(|m| m.ncols()).sum::<usize>().next_multiple_of(MAX_LANES);
     let mut out = vec![0.0; rows * across];
     for (r, row) in out.chunks_exact_mut(across.max(1)).enumerate() {
@@ -112,12 +112,7 @@ impl Mixed {
                     row[size] = from.e[r];
                 }
                 let of: Vec<&DMatrix<f64>> = noises.iter().map(|x: &Noise| &x.roots[k]).collect();
-                Station {
-                    size: rows_of,
-                    rows,
-                    roots: side_by_side(rows_of, &of),
-                    pixels: from.pixels.clone(),
-                }
+                Station { size: rows_of, rows, roots: in_one(rows_of, &of), pixels: from.pixels.clone() }
             })
             .collect();
         priors.extend(blocks.into_iter().map(|(prior, _)| prior));

@@ -37,7 +37,7 @@ mod weak_prior;
 mod tests;
 
 pub use agreement::{Agreement, SetFit};
-pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station};
+pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station, Tip, Touch, TouchPoint};
 pub use cell_start::{CellStart, start_of_cell};
 pub use components::Assumptions;
 pub use levels::{Level, LevelPrior};

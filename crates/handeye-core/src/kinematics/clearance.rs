@@ -70,7 +70,8 @@ mod tests {
                 _ => point(),
             };
             let found = segment_distance(p0, p1, q0, q1);
-            let tried = (0..=100).flat_map(|i| (0..=100).map(move |j| (f64::from(i) / 100.0, f64::from(j) / 100.0)));
+            let tried =
+                (0..=100).flat_map(|i| (0..=100).map(move |j| (f64::from(i) / 100.0, f64::from(j) / 100.0)));
             let least = tried
                 .map(|(s, t)| ((p0 + (p1 - p0) * s) - (q0 + (q1 - q0) * t)).norm())
                 .fold(f64::INFINITY, f64::min);

@@ -266,7 +266,9 @@ fn frames_are_those_of_the_joints_in_turn() {
     for (i, (joint, q)) in chain.joints().iter().zip(&q).enumerate() {
         let moved = match joint.kind {
             JointKind::Revolute => Vector6::new(0.0, 0.0, 0.0, joint.axis.x, joint.axis.y, joint.axis.z) * *q,
-            JointKind::Prismatic => Vector6::new(joint.axis.x, joint.axis.y, joint.axis.z, 0.0, 0.0, 0.0) * *q,
+            JointKind::Prismatic => {
+                Vector6::new(joint.axis.x, joint.axis.y, joint.axis.z, 0.0, 0.0, 0.0) * *q
+            }
         };
         t = t * joint.placement * Se3::exp(&moved);
         assert!((frame(i + 1) - t.to_matrix()).amax() < 1e-12, "joint {i}");

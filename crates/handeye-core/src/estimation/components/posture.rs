@@ -54,28 +54,31 @@ pub(in crate::estimation) struct Posture {
     functions: DMatrix<f64>,
     /// Root of the share of the variance that is each station's own.
     own: Vec<f64>,
+    roughness: f64,
 }
 
 impl Posture {
     /// At the flange.
-    pub fn flange(cell: &Cell) -> Self {
+    pub fn flange(cell: &Cell, roughness: f64) -> Self {
         Self::new(
             cell,
             "posture_flange",
             ["posture_flange_rad", "posture_flange_lever_m"],
             if cell.is_unseen() { &AT_FLANGE_UNSEEN } else { &AT_FLANGE },
             |rows| &rows.flange,
+            roughness,
         )
     }
 
     /// At the base.
-    pub fn base(cell: &Cell) -> Self {
+    pub fn base(cell: &Cell, roughness: f64) -> Self {
         Self::new(
             cell,
             "posture_base",
             ["posture_base_rad", "posture_base_lever_m"],
             if cell.is_unseen() { &AT_BASE_UNSEEN } else { &AT_BASE },
             |rows| &rows.base,
+            roughness,
         )
     }
 
@@ -85,6 +88,7 @@ impl Posture {
         levels: [&'static str; 2],
         beliefs: &'static Beliefs,
         rows: fn(&Rows) -> &DMatrix<f64>,
+        roughness: f64,
     ) -> Self {
         let eigen = SymmetricEigen::new(likeness(cell, beliefs.same_everywhere));
         let count = cell.stations.len();
@@ -96,7 +100,7 @@ impl Posture {
             eigen.eigenvectors[(k, kept[j])] * (eigen.eigenvalues[kept[j]] * (1.0 - OWN_SHARE)).sqrt()
         });
         let own = (0..count).map(|k| (1.0 - functions.row(k).norm_squared()).max(OWN_SHARE).sqrt()).collect();
-        Self { name, beliefs, levels, rows, functions, own }
+        Self { name, beliefs, levels, rows, functions, own, roughness }
     }
 }
 
@@ -123,9 +127,9 @@ impl Component for Posture {
         vec![
             Level {
                 name: self.levels[0],
-                start: 0.006 * degree,
+                start: 0.006 * degree * self.roughness,
                 prior: LevelPrior::Deviation {
-                    size: self.beliefs.size_deg * degree,
+                    size: self.beliefs.size_deg * degree * self.roughness,
                     exponent: self.beliefs.exponent,
                     tail: 2.0,
                     nothing: 1e-6 * degree,
