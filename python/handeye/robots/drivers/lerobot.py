@@ -39,6 +39,8 @@ HURRY = 1.5
 NEAR_RAD, REST_RAD, REST_S, SETTLE_S = 0.05, 1.5 * STEP_RAD, 0.6, 20.0
 # Short of its place it may only be late.
 LATE_S = 2.0
+# With this it holds the place at which it was stopped.
+STOP_RAD_S = 0.2
 
 
 class _Entry(msgspec.Struct):
@@ -146,7 +148,7 @@ class LeRobotArm:
         """
         self._stopped.set()
         with self._moving:  # move_to no longer sends places
-            self._send(self._joints(), np.full(len(self._servos), STEP_RAD))
+            self._send(self._joints(), np.full(len(self._servos), STOP_RAD_S))
             self._settled()
 
     def _checked(self, goal: Goal) -> FloatArray:
@@ -175,12 +177,12 @@ class LeRobotArm:
         for servo in self._servos:
             self._bus.write(servo.number, *TORQUE_ENABLE, 1)
         done_at, total_s = trapezoid(way, speed_rad_s, ACCELERATION_RAD_S2)
+        # The same to the end: a servo that is late must not creep.
+        rates = HURRY * speed_rad_s * np.abs(turn) / way
         began = time.monotonic()
         while not self._stopped.is_set():
             at_s = time.monotonic() - began
             place = here + turn * done_at(at_s + AHEAD_S) / way
-            # As fast as it takes to be there in time, a little more to catch up; never much above the goal's.
-            rates = HURRY * np.abs(place - (here + turn * done_at(at_s) / way)) / AHEAD_S
             self._send(place, rates)
             self._bus.read(self._servos[0].number, *PRESENT_POSITION)  # somebody is there
             if at_s > total_s:
