@@ -31,7 +31,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_request_for_all_cameras_is_met_and_kept(tmp_path: Path) -> None:
-    asked = Configuration("ur5e", 1.0, 0.1, most_views=30, rig=RigSettings(candidates=200))
+    asked = Configuration("ur5e", 5.0, 0.5, seed=6, rig=RigSettings(candidates=100))
     prepared = rig_cell(asked)
     session, store = begin_rig(prepared, tmp_path / "s")
     end = session.run()
