@@ -34,7 +34,7 @@ from handeye.types.recording import Recording
 # Logarithm of the factor in evidence that another way to understand all views must have.
 CLEARLY_BETTER = 20.0
 # Within this of the best another way explains the views as well; so many are named.
-AS_WELL = 3.0
+AS_WELL = 10.0
 MOST_RIVALS = 2
 # So many usual and so many odd ones are explained, of those whose misfit is less than this share of that as
 # given.

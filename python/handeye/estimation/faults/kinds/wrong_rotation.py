@@ -34,8 +34,9 @@ KIND = Kind(
     "writes the poses read in the convention that agrees",
 )
 HINT = "state how the poses are written (--notation), or write them as matrices T_base_flange in metres"
-# What is written less often than poses inverted, by this logarithm; of odd ways there are over a thousand.
-USUAL, SELDOM, ODD = -3.0, -5.0, -12.0
+# What is written less often than poses inverted, by this logarithm: by more than chance makes of readings
+# that a pan-tilt unit leaves alike. Of odd ways there are over a thousand.
+USUAL, SELDOM, ODD = -8.0, -9.0, -15.0
 _USUAL = (RADIANS.name, DEGREES.name, "kuka", "fanuc", "staubli", "doosan")
 _AXES = "xyz"
 _SIGNS = (
