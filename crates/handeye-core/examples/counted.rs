@@ -102,14 +102,11 @@ fn count_score(repeats: usize, points: u32, distorted: bool, noisy: bool, unit: 
     });
 }
 
+/// Does something with what gives the gains.
+type Use<'a> = dyn FnMut(&dyn Fn() -> Vec<f64>) + 'a;
+
 /// Sets up a case and hands over what scores it.
-fn score(
-    points: u32,
-    distorted: bool,
-    noisy: bool,
-    unit: VectorUnit,
-    run: &mut dyn FnMut(&dyn Fn() -> Vec<f64>),
-) {
+fn score(points: u32, distorted: bool, noisy: bool, unit: VectorUnit, run: &mut Use<'_>) {
     let mut scene = Scene::new(distorted, points);
     let (problem, start) = scene.problem(8);
     let solution = solved(&problem, &start);

@@ -100,12 +100,15 @@ def test_addresses_are_read_or_refused() -> None:
             XArmRobot(address)
 
 
-def test_the_makers_library_reads_the_mock(box: MockXArm) -> None:
+def test_the_makers_library_reads_the_mock(box: MockXArm, monkeypatch: pytest.MonkeyPatch) -> None:
     """The mock speaks the protocol, not a dialect of its own."""
     pytest.importorskip("xarm.core", reason="xarm-python-sdk is not installed")
     from xarm.core.comm.socket_port import SocketPort
+    from xarm.core.config.x_config import XCONF
     from xarm.core.wrapper.uxbus_cmd_tcp import UxbusCmdTcp
 
+    # The library takes any other port for one that reports.
+    monkeypatch.setattr(XCONF.SocketConf, "TCP_CONTROL_PORT", box.port)
     port = SocketPort("127.0.0.1", box.port, forbid_uds=True)
     try:
         commands = UxbusCmdTcp(port)
