@@ -150,7 +150,7 @@ def test_frames_of_the_controller_do_not_matter() -> None:
     elsewhere = Measurements.of(recording.mounting, recording.camera, recording.target, views)
     there = AutoEstimator(AutoOptions(kinematics=arm_kinematics(ARM, views)))(elsewhere)
     here = estimated(recording)
-    assert np.abs((there.X @ tool.inverse()).matrix - here.X.matrix).max() < 2e-5
+    assert np.abs((there.X @ tool.inverse()).matrix - here.X.matrix).max() < 4e-5
     for a, b in zip(there.joint_offsets, here.joint_offsets, strict=True):
         # Noise of base and flange has its levels in their frames: what it hides differs a little.
         assert a.offset == pytest.approx(b.offset, abs=0.3 * b.sigma)

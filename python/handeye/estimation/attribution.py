@@ -156,11 +156,18 @@ def attribution(
     misfit = {name: value for name, _, value in posterior.attribution}
     total = sum(misfit.values()) or 1.0
     theta = np.asarray(posterior.theta)
+    robot = {name: value for name, value in misfit.items() if name in _SIDES}
+    of_robot = max((evidence[name] for name in robot), default=0.0)
     causes = [  # explains much of the misfit, or much of what the robot would be blamed for
         name
         for name in ("camera", "board_scale", "time_lag")
         if evidence.get(name, 0.0) > DECISIVE
-        and (misfit[name] > CONVINCING_SHARE * total or evidence[name] > NEEDED_SHARE * posterior.robot_loss)
+        and (
+            misfit[name] > CONVINCING_SHARE * total
+            or evidence[name] > NEEDED_SHARE * posterior.robot_loss
+            # No error of an arm goes with its speed.
+            or (name == "time_lag" and evidence[name] > of_robot)
+        )
     ]
     if causes:
         cause = max(causes, key=lambda name: evidence[name])
@@ -173,7 +180,6 @@ def attribution(
         return Finding(
             f"blame_{cause}", f"{words}, which explains {share:.0f} % of what the pictures are off", evidence
         )
-    robot = {name: value for name, value in misfit.items() if name in _SIDES}
     if noise.robot_side is RobotSide.NONE or not robot:
         return Finding("blame_nothing", "pixel noise alone explains these views", evidence)
     worst = max(robot, key=lambda name: robot[name])

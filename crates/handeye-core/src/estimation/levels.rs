@@ -6,13 +6,15 @@
 /// never shows costs more and more. No level is kept away from zero, and none has an end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LevelPrior {
-    /// A deviation `s` of density `s^exponent / (1 + s / size)^2` in its logarithm, down to where it is nothing: rare
-    /// beyond its size, and nowhere impossible.
+    /// A deviation `s` of density `(1 + s / (LEAST size))^exponent / (1 + s / size)^tail` in its logarithm, down to where it
+    /// is nothing: rare beyond its size, nowhere impossible, and of any scale where it hardly matters.
     Deviation {
         /// Where sizes become rare, in the unit of the level.
         size: f64,
-        /// How much likelier larger levels are below it; nearly nothing for what residuals show.
+        /// How much likelier larger levels are between [`LEAST`] of it and it; nearly nothing for what residuals show.
         exponent: f64,
+        /// Power by which larger ones become rare; the higher where residuals do not show them.
+        tail: f64,
         /// Below this it is as good as nothing.
         nothing: f64,
     },
@@ -34,8 +36,8 @@ pub struct Level {
     pub prior: LevelPrior,
 }
 
-/// Power by which levels beyond their size become rare.
-const TAIL: f64 = 2.0;
+/// Share of its size below which a level of any scale is as likely: an arm that errs by so little may be exact.
+const LEAST: f64 = 0.05;
 /// How sharply a level ends where it is nothing, in its logarithm.
 const WALL: f64 = 0.5;
 
@@ -55,14 +57,16 @@ impl Level {
                 let z = (t - self.start.ln()) / spread;
                 (0.5 * z * z, z / spread, spread.powi(-2))
             }
-            LevelPrior::Deviation { size, exponent, nothing } => {
+            LevelPrior::Deviation { size, exponent, tail, nothing } => {
                 let relative = t.exp() / size;
                 let share = relative / (1.0 + relative);
+                let drawn = relative / (LEAST + relative);
                 let below = (nothing.ln() - t).max(0.0) / WALL;
                 (
-                    TAIL * relative.ln_1p() - exponent * t + 0.5 * below * below,
-                    TAIL * share - exponent - below / WALL,
-                    TAIL * share / (1.0 + relative) + if below > 0.0 { WALL.powi(-2) } else { 0.0 },
+                    tail * relative.ln_1p() - exponent * (relative / LEAST).ln_1p() + 0.5 * below * below,
+                    tail * share - exponent * drawn - below / WALL,
+                    tail * share * (1.0 - share) - exponent * drawn * (1.0 - drawn)
+                        + if below > 0.0 { WALL.powi(-2) } else { 0.0 },
                 )
             }
         }

@@ -20,7 +20,7 @@ impl Component for BoardScale {
         vec![Level {
             name: "board_scale",
             start: 1e-4,
-            prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.1, nothing: 1e-6 },
+            prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.1, tail: 1.0, nothing: 1e-6 },
         }]
     }
 

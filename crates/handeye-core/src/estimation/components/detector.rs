@@ -25,7 +25,8 @@ impl Component for Detector {
 
     fn levels(&self) -> Vec<Level> {
         let degree = 1_f64.to_radians();
-        let deviation = |size: f64, nothing: f64| LevelPrior::Deviation { size, exponent: 0.02, nothing };
+        let deviation =
+            |size: f64, nothing: f64| LevelPrior::Deviation { size, exponent: 0.02, tail: 1.0, nothing };
         vec![
             Level { name: "detector_across_m", start: 2e-4, prior: deviation(2e-3, 1e-6) },
             // Depth is what pictures know least.

@@ -29,7 +29,12 @@ impl Component for JointNoise {
         vec![Level {
             name: "joint_rad",
             start: 0.004 * degree,
-            prior: LevelPrior::Deviation { size: 0.02 * degree, exponent: 0.12, nothing: 1e-4 * degree },
+            prior: LevelPrior::Deviation {
+                size: 0.02 * degree,
+                exponent: 0.12,
+                tail: 1.0,
+                nothing: 1e-6 * degree,
+            },
         }]
     }
 

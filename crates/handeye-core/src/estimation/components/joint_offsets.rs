@@ -29,7 +29,12 @@ impl Component for JointOffsets {
         vec![Level {
             name: "offset_rad",
             start: 0.01 * degree,
-            prior: LevelPrior::Deviation { size: 0.05 * degree, exponent: 0.25, nothing: 1e-4 * degree },
+            prior: LevelPrior::Deviation {
+                size: 0.07 * degree,
+                exponent: 0.35,
+                tail: 1.0,
+                nothing: 1e-6 * degree,
+            },
         }]
     }
 

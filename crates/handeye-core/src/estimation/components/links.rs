@@ -31,12 +31,17 @@ impl Component for Links {
             Level {
                 name: "link_m",
                 start: 1e-4,
-                prior: LevelPrior::Deviation { size: 5e-4, exponent: 0.3, nothing: 1e-6 },
+                prior: LevelPrior::Deviation { size: 7e-4, exponent: 0.42, tail: 1.0, nothing: 1e-8 },
             },
             Level {
                 name: "link_rad",
                 start: 0.005 * degree,
-                prior: LevelPrior::Deviation { size: 0.03 * degree, exponent: 0.3, nothing: 1e-4 * degree },
+                prior: LevelPrior::Deviation {
+                    size: 0.04 * degree,
+                    exponent: 0.42,
+                    tail: 1.0,
+                    nothing: 1e-6 * degree,
+                },
             },
         ]
     }

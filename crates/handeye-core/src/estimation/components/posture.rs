@@ -29,11 +29,11 @@ struct Beliefs {
 }
 
 /// Wrists are short, and what they hide is small.
-const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.2, lever_m: 0.4 };
+const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.26, lever_m: 0.4 };
 /// Shoulders and mountings carry the whole reach.
-const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.4, lever_m: 1.0 };
+const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.6, lever_m: 1.0 };
 /// Functions that carry less of the variance than this count as each station's own.
-const SMALLEST_FUNCTION: f64 = 0.01;
+const SMALLEST_FUNCTION: f64 = 1e-4;
 /// So do all but the largest: where stations have little in common there are as many functions as stations, and each
 /// says as little as noise of its own.
 const MOST_FUNCTIONS: usize = 6;
@@ -119,7 +119,8 @@ impl Component for Posture {
                 prior: LevelPrior::Deviation {
                     size: self.beliefs.size_deg * degree,
                     exponent: self.beliefs.exponent,
-                    nothing: 1e-4 * degree,
+                    tail: 2.0,
+                    nothing: 1e-6 * degree,
                 },
             },
             Level {

@@ -38,7 +38,12 @@ impl Component for RobotPose {
             Level {
                 name: self.levels[0],
                 start: 0.004 * degree,
-                prior: LevelPrior::Deviation { size: 0.02 * degree, exponent: 0.02, nothing: 1e-4 * degree },
+                prior: LevelPrior::Deviation {
+                    size: 0.02 * degree,
+                    exponent: 0.02,
+                    tail: 1.0,
+                    nothing: 1e-6 * degree,
+                },
             },
             Level { name: self.levels[1], start: 1.0, prior: LevelPrior::Ratio { spread: 0.7 } },
         ]

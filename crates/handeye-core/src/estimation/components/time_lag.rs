@@ -27,7 +27,7 @@ impl Component for TimeLag {
         vec![Level {
             name: "lag_s",
             start: 1e-3,
-            prior: LevelPrior::Deviation { size: 0.05, exponent: 0.02, nothing: 1e-6 },
+            prior: LevelPrior::Deviation { size: 0.05, exponent: 0.02, tail: 1.0, nothing: 1e-6 },
         }]
     }
 
