@@ -5,8 +5,8 @@
 
 Every picture is drawn from its number alone, so parts can be measured one after the other (`--first`).
 `found`: perspective up to 60 deg, blur, noise, gamma, uneven light, clutter, things in front of the board and
-boards cut by the edge of the picture. Found is a board of which there are four corners, right is one without a
-false corner: one further than FALSE_PX from where it is projected to, whatever its name.
+boards cut by the edge of the picture. Found is a board of which there are four corners, right is one
+without a false corner: one further than FALSE_PX from where it is projected to, whatever its name.
 `descriptions`: every family is described wrongly in the ways that people do; right is an answer that names
 the board that is shown, or corners under their right names where the mistake does not matter.
 """
@@ -162,7 +162,7 @@ def away_px(target: Target, ids: np.ndarray, pixels: np.ndarray, truth: np.ndarr
 
 @dataclass
 class Tally:
-    """What one finder did: boards, those without a false corner, corners, false ones, errors, processor time."""
+    """What one finder did: boards, those without a false corner, corners, false ones, errors, time."""
 
     boards: int = 0
     right: int = 0
@@ -177,7 +177,11 @@ class Tally:
         if len(away) < FEWEST:
             return False
         is_right = bool((away <= FALSE_PX).all())
-        self.boards, self.right, self.corners = self.boards + 1, self.right + is_right, self.corners + len(away)
+        self.boards, self.right, self.corners = (
+            self.boards + 1,
+            self.right + is_right,
+            self.corners + len(away),
+        )
         self.false += int((away > FALSE_PX).sum())
         self.medians_px.append(float(np.median(away)))
         return is_right
@@ -212,7 +216,9 @@ def found(family: str, first: int, count: int) -> None:
         only["ours"] += here and not there
         only["OpenCV"] += there and not here
         if there and not here:
-            print(f"lost: {family} {number}: {outcome.evidence if isinstance(outcome, NotFound) else 'false'}")
+            print(
+                f"lost: {family} {number}: {outcome.evidence if isinstance(outcome, NotFound) else 'false'}"
+            )
     print(
         f"{family}, pictures {first} to {first + count - 1}:\n  handeye {ours}\n  OpenCV {theirs}\n  "
         f"right by one alone: handeye {only['ours']}, OpenCV {only['OpenCV']}",
@@ -333,7 +339,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("what", choices=("found", "descriptions"))
-    parser.add_argument("--family", choices=[name for name in FAMILIES if name != "chessboard"], default="charuco")
+    parser.add_argument(
+        "--family", choices=[name for name in FAMILIES if name != "chessboard"], default="charuco"
+    )
     parser.add_argument("--first", type=int, default=0, help="number of the first picture")
     parser.add_argument("--count", type=int, default=500, help="number of pictures")
     options = parser.parse_args()

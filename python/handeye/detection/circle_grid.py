@@ -33,8 +33,8 @@ LEAST_LINE_SHARE = 0.6
 SMALL_PX, FEWEST_TOGETHER = 8.0, 8
 # How much larger a marked circle of unknown size is guessed to be.
 LARGER = 1.5
-# A circle may be off from where those around it put it by this much, or this share of the way to the next; one
-# that something covers in part is off by more. Of the circles so many must be measured well.
+# A circle may be off from where those around it put it by this much, or this share of the way to the next;
+# one that something covers in part is off by more. Of the circles so many must be measured well.
 OFF_PX, OFF_SHARE, LEAST_MEASURED = 0.3, 0.01, 0.6
 # A circle further from where it was expected, as a share of the root of its area, or of another size, is
 # something else.
@@ -89,7 +89,7 @@ def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | Non
 
 
 def _fit_others(plane: FloatArray, pixels: FloatArray) -> NDArray[np.bool_]:
-    """Tell which circles (N,) at places of the board and of the image (N, 2) lie where those around put them."""
+    """Tell which circles (N,), at (N, 2) on the board and in the image, lie where those around put them."""
     away = np.linalg.norm(pixels[:, np.newaxis] - pixels, axis=2)
     np.fill_diagonal(away, np.inf)
     off = np.linalg.norm(from_neighbours(plane, pixels) - pixels, axis=1)

@@ -19,7 +19,8 @@ from handeye.types.arrays import IndexArray
 from handeye.types.target import Coded, MarkerCorners
 
 _Board = TypeVar("_Board", bound=Target)
-# Boards are looked for in a picture no larger than this; circles, of which noise makes many, in a smaller one.
+# Boards are looked for in a picture no larger than this; circles, of which noise makes many, in a
+# smaller one.
 SEARCH_SIDE_PX, CIRCLES_SIDE_PX = 1400, 600
 # Fewer markers are chance where none are expected.
 FEWEST_MARKERS = 4

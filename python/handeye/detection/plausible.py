@@ -19,7 +19,7 @@ STEP_SHARE = 0.05
 
 
 def implausible(target: Target, found: Detection) -> NotFound | None:
-    """Return what speaks against points as those of a flat board seen from its front; None if nothing does."""
+    """Return what speaks against points as those of a flat board seen from its front; None for nothing."""
     plane = target.points[found.point_ids, :2]
     lens = _core.PlaneMap.fitted(plane, found.pixels)
     if lens is None:

@@ -19,7 +19,7 @@ from handeye.detection.corner_fit import (
     spread,
 )
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.edge_shift import without_edge_shift
+from handeye.detection.edge_shift import unknown_shift_px, without_edge_shift
 from handeye.detection.marker_lattice import contradiction
 from handeye.detection.markers import (
     LEAST_SHARE,
@@ -42,8 +42,8 @@ WINDOW_SHARE = 0.8
 BAND_SHARE = 0.8
 # Tags read where they are expected.
 FEWEST_TAGS = 2
-# A side of a marker is dark on one side of a line, so far from it, at so many of its places, this share of the
-# usual step or more.
+# A side of a marker is dark on one side of a line, so far from it, at so many of its places, this share of
+# the usual step or more.
 SIDE_SAMPLES, ASIDE_PX, SIDE_SHARE, SIDE_CONTRAST = 24, 2.0, 0.8, 0.3
 # Tried until all tags are found, the last only if some are; one leaves the ink as it is.
 THINNING_PX = (3, 1, 5)
@@ -95,7 +95,8 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
     if len(tags) == 1 and not _has_sides(image, fits.places):
         return NotFound(Reason.INCOMPLETE, "the marker is seen, but something covers a corner of it")
     sharp = without_edge_shift(plane[good], fits.places[good], _sides(target, tags, steps)[good])
-    return ordered(target, points.ravel()[good], sharp, fits.sigmas_px[good])
+    sigmas = np.hypot(fits.sigmas_px[good], unknown_shift_px(len(good)))
+    return ordered(target, points.ravel()[good], sharp, sigmas)
 
 
 def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | None:
@@ -121,7 +122,8 @@ def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | 
     if good.sum() < max(4, LEAST_SHARE * 4 * expected.sum()):
         return None
     sharp = without_edge_shift(plane[good], fits.places[good], _sides(target, tags, steps)[good])
-    return ordered(target, ids[good], sharp, fits.sigmas_px[good])
+    sigmas = np.hypot(fits.sigmas_px[good], unknown_shift_px(len(good)))
+    return ordered(target, ids[good], sharp, sigmas)
 
 
 def _markers(image: Image, target: MarkerCorners) -> Seen:
