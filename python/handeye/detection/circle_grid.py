@@ -35,7 +35,7 @@ SMALL_PX, FEWEST_TOGETHER = 8.0, 8
 LARGER = 1.5
 # A circle may be off from where those around it put it by this much, or this share of the way to the next;
 # one that something covers in part is off by more. Of the circles so many must be measured well.
-OFF_PX, OFF_SHARE, LEAST_MEASURED = 0.3, 0.01, 0.6
+OFF_PX, OFF_SHARE, LEAST_MEASURED = 0.6, 0.02, 0.6
 # A circle further from where it was expected, as a share of the root of its area, or of another size, is
 # something else.
 ASTRAY_SHARE, AREA_RATIO = 0.3, 1.5
