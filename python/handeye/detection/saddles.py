@@ -92,12 +92,11 @@ def _strengths(picture: Image) -> NDArray[np.float32]:
 def _maxima(strengths: NDArray[np.float32]) -> FloatArray:
     """Return the strongest places (N, 2), each the strongest of its surroundings, to parts of a pixel."""
     highest = cv2.dilate(strengths, np.ones((ALONE_PX, ALONE_PX), dtype=np.uint8))
-    is_highest = cv2.compare(strengths, highest, cv2.CMP_GE)
-    is_strong = cv2.compare(strengths, LEAST_STRENGTH, cv2.CMP_GT)
     border = ALONE_PX // 2 + 1
-    inside = (slice(border, -border), slice(border, -border))
-    found = cv2.findNonZero(cv2.bitwise_and(is_highest, is_strong)[inside])
-    columns, rows = np.zeros((2, 0), dtype=np.int64) if found is None else found.reshape(-1, 2).T + border
+    inner = (slice(border, -border), slice(border, -border))
+    inside = strengths[inner]
+    rows, columns = np.nonzero((inside == highest[inner]) & (inside > LEAST_STRENGTH))
+    rows, columns = rows + border, columns + border
     values = strengths[rows, columns]
     # Equal strengths are taken in the order of the pixels, so that the answer is always the same.
     order = np.argsort(-values, kind="stable")[:MOST]
