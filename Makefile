@@ -26,7 +26,7 @@ say = @printf '== %s\n'
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test check bench docs build wheels lock clean distclean FORCE
+.PHONY: help demo test check bench public docs build wheels lock clean distclean FORCE
 
 help: ## list the targets
 	@printf 'handeye: make TARGET, one of\n'
@@ -64,6 +64,8 @@ bench: build $(STAMPS)/bench ## measure solver and scorer on this machine, side 
 		printf '== %s\n' 'without Ceres for C++, whose rows are left out; to have them: sudo apt-get install libceres-dev'
 	$(say) 'handeye bench (about three minutes)'
 	@$(BIN)/handeye bench --output benchmarks
+
+public: build $(STAMPS)/public ## install what `handeye study public` compares with: other people's benchmark and renderer
 
 docs: $(STAMPS)/dev ## build the documentation into docs/_build/html
 	$(say) 'sphinx-build docs docs/_build/html'
@@ -105,6 +107,12 @@ $(STAMPS)/bench: requirements/bench.txt $(STAMPS)/run
 	@$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements/bench.txt
 	@mkdir -p $(STAMPS) && touch $@
 
+# Other people's benchmark and renderer, for `handeye study public`.
+$(STAMPS)/public: requirements/public.txt $(STAMPS)/run
+	$(say) 'installing the pinned packages of requirements/public.txt (a minute the first time)'
+	@$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements/public.txt
+	@mkdir -p $(STAMPS) && touch $@
+
 # Rebuilt only when something it is made of has changed, or when the built library has been removed.
 $(STAMPS)/core: $(STAMPS)/run $(RUST_SOURCES) Cargo.toml Cargo.lock pyproject.toml $(if $(EXTENSION),,FORCE)
 	@command -v cargo >/dev/null || { echo 'a Rust toolchain (cargo, rustc) is needed' >&2; exit 1; }
@@ -116,7 +124,7 @@ FORCE:
 
 # The files it writes carry hashes and no addresses.
 lock: requirements/pins.txt pyproject.toml ## resolve requirements/*.txt from pyproject.toml (needs the registry)
-	$(say) 'resolving requirements/dev.txt, run.txt and bench.txt'
+	$(say) 'resolving requirements/dev.txt, run.txt, bench.txt and public.txt'
 	@$(PYTHON) tools/lock.py
 
 clean: ## remove what was built; keep .venv

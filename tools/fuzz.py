@@ -54,46 +54,15 @@ from sessions import run as run_session
 ROOT = Path(__file__).resolve().parent.parent
 MOST_CPU_S, MOST_BYTES = 10, 1 << 30
 BATCH = 200
+# Larger folders among the cases are no examples: every input copies one.
+MOST_EXAMPLE_BYTES = 500_000
 # One in so many inputs goes to a command rather than a reader.
 COMMANDS_SHARE = 40
 WORDS = (
-    *(
-        b"nan",
-        b"inf",
-        b"-1",
-        b"0",
-        b"1e400",
-        b"1e-320",
-        b"9" * 400,
-        b"0x" + b"f" * 300,
-        b"-0.0",
-        b"1,5",
-        b"\x00",
-    ),
-    *(
-        b"\xff\xfe",
-        "ß⁵\u202e".encode(),
-        b"[/b]",
-        b"[" * 500,
-        b"{" * 500,
-        b"<a " * 300,
-        b"&x;",
-        b"\n" * 200,
-        b"\r",
-    ),
-    *(
-        b"null",
-        b"true",
-        b'""',
-        b"'",
-        b'"',
-        b"#",
-        b"[[view]]",
-        b"../../etc/passwd",
-        b"/dev/zero",
-        b"%s%n",
-        b"!!python",
-    ),
+    *b"nan inf -1 0 1e400 1e-320 -0.0 1,5 [/b] &x; null true [[view]] ../../etc/passwd /dev/zero".split(),
+    *b'%s%n !!python "" \' " # \x00 \xff\xfe'.split(),
+    *(b"9" * 400, b"0x" + b"f" * 300, b"[" * 500, b"{" * 500, b"<a " * 300, b"\n" * 200, b"\r"),
+    "\u00df\u2075\u202e".encode(),
 )
 
 
@@ -148,6 +117,10 @@ def rig() -> RigRecording:
     return RigRecording.of_views("two", cameras, {"table": MountedTarget(one.target, Body.BASE)}, views)
 
 
+def _size(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
 def session(path: Path) -> None:
     """Open a session."""
     open_session(path).close()
@@ -191,8 +164,10 @@ def examples(folder: Path) -> tuple[list[Example], list[Example]]:
             readers.append(Example(f"poses {path.name}", path, read_poses))
         elif path.suffix in {".toml", ".json"}:
             readers.append(Example(f"target {path.name}", path, read_target))
+    small = [path for path in sorted(cases.glob("*")) if path.is_dir() and _size(path) < MOST_EXAMPLE_BYTES]
+    readers += [Example(f"folder {path.name}", path, open_folder) for path in small]
     commands = [
-        Example(f"handeye {' '.join(words)}", path, command(*words))
+        Example(f"handeye {words[0]}", path, command(*words))
         for path in (recording, folder / "session")
         for words in (
             ("solve",),
@@ -200,8 +175,18 @@ def examples(folder: Path) -> tuple[list[Example], list[Example]]:
             ("validate", "--splits", "1"),
             ("arm",),
             ("import",),
+            ("doctor",),
+            ("replay",),
+            ("check", str(recording)),
             ("run", "--resume", "--session"),
         )
+    ]
+    result = folder / "result.json"
+    commands += [
+        Example("handeye detect", photos, command("detect", "--rows", "6", "--columns", "9")),
+        Example("handeye report", result, command("report")),
+        Example("handeye export", result, command("export", "--format", "ros2")),
+        Example("handeye diff", result, command("diff", str(result))),
     ]
     return readers, commands
 

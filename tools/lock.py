@@ -1,4 +1,4 @@
-"""Resolve requirements/dev.txt, run.txt and bench.txt from pyproject.toml, with hashes and without addresses.
+"""Resolve requirements/*.txt from pyproject.toml, with hashes and without addresses.
 
 Run by `make lock`. The resolver lives in a throw-away environment, so nobody needs it for anything else.
 """
@@ -23,10 +23,10 @@ OPTIONS = [
 ]
 
 
-def resolve(uv: Path, output: str, groups: list[str], constraints: str) -> None:
-    """Write `output`: the package's own dependencies and those of `groups`, within `constraints`."""
+def resolve(uv: Path, output: str, groups: list[str], constraints: str, extras: tuple[str, ...] = ()) -> None:
+    """Write `output`: the package's own dependencies, those of groups and extras, within constraints."""
     command = [str(uv), "pip", "compile", "pyproject.toml", *OPTIONS, f"--constraints={constraints}"]
-    command += [f"--group={group}" for group in groups]
+    command += [f"--group={group}" for group in groups] + [f"--extra={extra}" for extra in extras]
     if "--upgrade" in sys.argv[1:]:
         command.append("--upgrade")
     subprocess.run([*command, f"--output-file={output}"], cwd=ROOT, check=True)
@@ -45,6 +45,9 @@ def main() -> None:
         resolve(bin_folder / "uv", "requirements/dev.txt", ["dev", "docs"], "requirements/pins.txt")
         resolve(bin_folder / "uv", "requirements/run.txt", ["build"], "requirements/dev.txt")
         resolve(bin_folder / "uv", "requirements/bench.txt", ["build", "bench"], "requirements/dev.txt")
+        # What `handeye study public` needs beside: other people's benchmark and renderer.
+        extras = ("public", "sim")
+        resolve(bin_folder / "uv", "requirements/public.txt", ["build"], "requirements/dev.txt", extras)
 
 
 if __name__ == "__main__":

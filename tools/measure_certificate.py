@@ -7,6 +7,7 @@ Local minima are where a descent from a random answer ends above the best that i
 """
 
 import argparse
+import time
 
 import numpy as np
 
@@ -27,12 +28,14 @@ def main() -> None:
     """Run the problems, sum up."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--problems", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first problem")
     parser.add_argument("--starts", type=int, default=3, help="random answers to descend from in each")
     options = parser.parse_args()
     seconds: list[float] = []
+    busy: list[float] = []
     gaps: list[float] = []
     certified = planted = wrongly = 0
-    for number in range(options.problems):
+    for number in range(options.first, options.first + options.problems):
         random = np.random.default_rng(number)
         views, turn = int(random.integers(4, 16)), random.uniform(0.3, 1.5)
         X, Y = transforms(random, 2, 0.5, 2.0)
@@ -40,7 +43,10 @@ def main() -> None:
         noise_rad, noise_m = 10 ** random.uniform(-4, -2), 10 ** random.uniform(-4, -2.3)
         off = random.normal(size=(views, 6)) * np.repeat([noise_m, noise_rad], 3)
         C = _core.se3_exp(off) @ X @ A @ Y
-        found = certify(PoseProblem(A, C), *_core.closed_form("shah", A, C))
+        answer = _core.closed_form("shah", A, C)
+        began = time.process_time()
+        found = certify(PoseProblem(A, C), *answer)
+        busy.append(time.process_time() - began)
         seconds.append(found.seconds)
         certified += found.certified
         weighted = PoseProblem(A, C, sigmas=found.sigmas)
@@ -52,8 +58,10 @@ def main() -> None:
                 gaps.append(elsewhere.gap)
     print(f"{certified} of {options.problems} certified")
     print(f"{planted} local minima, {wrongly} certified wrongly, smallest gap {min(gaps, default=0.0):.0%}")
-    middle, late = np.percentile(seconds, [50, 95])
-    print(f"{1e3 * middle:.1f} ms in the median, 95 % within {1e3 * late:.1f} ms")
+    # On a machine that does other things too, what the processor took says more than the clock.
+    for name, taken in (("by the clock", seconds), ("of the processor", busy)):
+        middle, late = 1e3 * np.percentile(taken, [50, 95])
+        print(f"{name}: {middle:.1f} ms in the median, 95 % within {late:.1f} ms")
 
 
 if __name__ == "__main__":

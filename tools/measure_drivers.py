@@ -2,8 +2,10 @@
 
 A cell with a truth stands behind a controller and a camera; pictures are rendered. The controller is the
 mock of Universal Robots (`--robot ur`) or franky-sim (`--robot franka`, which needs franky-control and
-franky-sim), whose arm MuJoCo moves; the camera sees it there, with the errors of the cell's arm
-on top. The camera is pylon's emulator (`--camera basler`, extra basler) or the cell itself (`--camera mock`).
+franky-sim), whose arm MuJoCo moves; the camera sees it there, with the errors of the cell's arm on top. The
+camera is pylon's emulator (`--camera basler`, extra basler) or the cell itself (`--camera mock`).
+`--robot ros2` is a cell in ROS 2 in a process of its own, with its own camera; a third process records a bag,
+which is solved too (tools/make_ros2_peer.py makes the environment).
 
 python tools/measure_drivers.py --camera basler --seeds 1 2 3
 """
@@ -12,6 +14,8 @@ import argparse
 import io
 import json
 import os
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -110,8 +114,14 @@ class Followed(Shown):
 def franka(_: argparse.Namespace, seed: int) -> Iterator[tuple[Shown, str, str]]:
     """Give a cell, the specification of its driver and the description of its arm."""
     import franky_sim  # noqa: PLC0415 - only where it is asked for
+    import pinocchio  # noqa: PLC0415 - comes with it
+    from franky_sim.base_simulator import BaseRobot  # noqa: PLC0415
     from franky_sim.mujoco_simulator import MujocoSimulator  # noqa: PLC0415
 
+    # franky-sim 1.0.4 hands out its one pose and computes the next one into it: O_T_EE, the measured pose,
+    # comes out as that of the commanded joints, 0.1 deg beside the measured ones. Here it hands out copies.
+    shared = BaseRobot.kinematics
+    BaseRobot.kinematics = lambda self, q: pinocchio.SE3(shared(self, q))
     described = Path(franky_sim.__file__).parent / "assets" / "fr3_clean.urdf"
     cell = Followed(read_urdf(described), seed=seed)
     with MujocoSimulator(enable_visualization=False) as simulator:
@@ -127,15 +137,60 @@ def franka(_: argparse.Namespace, seed: int) -> Iterator[tuple[Shown, str, str]]
             yield cell, f"franka:{address}", str(described)
 
 
-ROBOTS = {"ur": universal_robot, "franka": franka}
+@contextmanager
+def started(*command: str) -> Iterator[None]:
+    """Start a process that says when it is ready, and ends with its input."""
+    process = subprocess.Popen(
+        [sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    try:
+        yield
+    finally:
+        process.stdin.close()
+        process.wait(60)
+
+
+@contextmanager
+def ros2(arguments: argparse.Namespace, seed: int) -> Iterator[tuple[Shown, str, str]]:
+    """Give a cell, whose twin moves in another process, the specification of its driver, its arm."""
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    recorder = str(Path(__file__).parent / "record_ros2_bag.py")
+    with (
+        started("-m", "handeye.testing.ros2", "--seed", str(seed)),
+        started(recorder, str(arguments.folder / "bag")),
+    ):
+        yield Shown("ur5e", seed=seed), "ros2:base=base,flange=flange", "ur5e"
+
+
+def of_the_bag(cell: Shown, folder: Path) -> Pose | None:
+    """Return what the bag of a session is solved to; None where it is not."""
+    printed = io.StringIO()
+    command = ["solve", str(folder / "bag"), "--target", str(folder / "target.toml"), "--json"]
+    command += ["--base-frame", "base", "--flange-frame", "flange", "--mounting", cell.mounting.value]
+    with redirect_stdout(printed):
+        run(command)
+    answer = json.loads(printed.getvalue())
+    if "error" in answer:
+        print(answer["error"])
+    return Pose(answer["T_flange_camera"]) if "T_flange_camera" in answer else None
+
+
+ROBOTS = {"ur": universal_robot, "franka": franka, "ros2": ros2}
 
 
 def calibrated(arguments: argparse.Namespace, seed: int, folder: Path) -> dict[str, object]:
     """Run one calibration; return what came of it."""
     printed, began = io.StringIO(), time.monotonic()
+    arguments.folder = folder
     with ROBOTS[arguments.robot](arguments, seed) as (cell, driver, arm):
         camera, target = cell.write(folder)
-        images = emulated(cell, folder) if arguments.camera == "basler" else of_the_cell(cell)
+        if arguments.robot == "ros2":
+            images = "ros2:/camera/image_raw"
+        else:
+            images = emulated(cell, folder) if arguments.camera == "basler" else of_the_cell(cell)
         command = ["run", "--session", str(folder / "session"), "--robot", arm, "--no-confirm", "--json"]
         command += ["--driver", driver, "--images", images, "--speed-deg-s", "60"]
         command += ["--camera", str(camera), "--target", str(target), "--workspace-mm", *SPACE_MM]
@@ -147,6 +202,12 @@ def calibrated(arguments: argparse.Namespace, seed: int, folder: Path) -> dict[s
     T_flange_camera = Pose(answer["calibration"]["T_flange_camera"])
     truth = cell.truth.X
     off = (truth @ T_flange_camera).log() if truth is not None else np.full(6, np.nan)
+    bag: dict[str, float] = {}
+    if arguments.robot == "ros2":
+        solved = of_the_bag(cell, folder)
+        apart = np.full(6, np.nan) if solved is None else (solved.inverse() @ T_flange_camera).log()
+        bag["bag_apart_mm"] = round(1e3 * float(np.linalg.norm(apart[:3])), 4)
+        bag["bag_apart_deg"] = round(float(np.rad2deg(np.linalg.norm(apart[3:]))), 5)
     return {
         "seed": seed,
         "end": answer["end"],
@@ -155,7 +216,7 @@ def calibrated(arguments: argparse.Namespace, seed: int, folder: Path) -> dict[s
         "off_mm": round(1e3 * float(np.linalg.norm(off[:3])), 3),
         "off_deg": round(float(np.rad2deg(np.linalg.norm(off[3:]))), 4),
         "seconds": round(time.monotonic() - began, 1),
-    }
+    } | bag
 
 
 def main() -> None:
@@ -164,12 +225,17 @@ def main() -> None:
     parser.add_argument("--robot", choices=[*ROBOTS], default="ur")
     parser.add_argument("--camera", choices=["basler", "mock"], default="mock")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--keep", type=Path, help="folder to keep everything in")
     parser.add_argument("--pace", type=float, default=4.0, help="so many times faster than stated")
     arguments = parser.parse_args()
     os.environ["PYLON_CAMEMU"] = "1"
     for seed in arguments.seeds:
-        with tempfile.TemporaryDirectory() as folder:
-            print(json.dumps(calibrated(arguments, seed, Path(folder))), flush=True)
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = (
+                Path(temporary) if arguments.keep is None else arguments.keep / f"{arguments.robot}_{seed}"
+            )
+            folder.mkdir(parents=True, exist_ok=True)
+            print(json.dumps(calibrated(arguments, seed, folder)), flush=True)
 
 
 if __name__ == "__main__":

@@ -494,9 +494,13 @@ def estimate_cell(
     *,
     velocities: ArrayLike | None = None,
     arm: tuple[ArrayLike, ArrayLike, list[float], list[int], list[bool]] | None = None,
+    approach: ArrayLike | None = None,
     exact_robot: bool = False,
+    roughness: float = 1.0,
     board_scale: bool = False,
     start: tuple[ArrayLike, ArrayLike] | None = None,
+    tips: Sequence[tuple[bool, ArrayLike, ArrayLike]] = ...,
+    touches: Sequence[tuple[int, list[int], tuple[int, ArrayLike] | None, ArrayLike]] = ...,
     pairs: int,
     most_rounds: int,
 ) -> Posterior:
@@ -508,7 +512,12 @@ def estimate_cell(
     flange. `seen`: camera, target, its views, and for each of these its station and pixel variance in px^2.
     `velocities` (S, 6): twists of the flange per second. `arm`: twists (S, 6, n) of the flange per joint
     and (S, 6, m) per way of displacing a joint on its link, what a deviation of one means for each joint,
-    joints whose offset is a parameter, and which ways are in metres. `start`: X (C, 4, 4) and Y (T, 4, 4).
+    joints whose offset is a parameter, and which ways are in metres. `approach` (S, 6, n): twists of the
+    flange per joint and its play, by the side that it came from. `start`: X (C, 4, 4) and Y (T, 4, 4).
+    `roughness`: how many times larger hidden errors of the arm are believed to be than those of good arms.
+    A tip is whether it is on the flange, where (3,), and how well that is known, information (3, 3); three
+    parameters each behind those of the boards. A touch is its station, behind those of the pictures, one tip
+    or two, a target with the point (3,) of it, and the covariance (3, 3) of how well the two met.
     """
 
 # Kinematics
@@ -529,6 +538,9 @@ class Chain:
     def joint_count(self) -> int: ...
     def forward(self, joints: ArrayLike) -> NDArray[float64]:
         """`T_base_flange` (N, 4, 4) at joints (N, n)."""
+
+    def frames(self, joints: ArrayLike) -> NDArray[float64]:
+        """Poses (N, n + 2, 4, 4) in the base at joints (N, n): the base itself, each joint, the flange."""
 
     def jacobians(self, joints: ArrayLike, frame: str) -> NDArray[float64]:
         """Twists (N, 6, n) per joint.
@@ -570,6 +582,15 @@ class Chain:
         attempts: int = 100,
     ) -> NDArray[float64]:
         """All different joints (S, n) found that reach a pose (4, 4)."""
+
+def least_gaps(
+    points: ArrayLike, pairs: list[tuple[int, int, int, int]], radii: list[float]
+) -> NDArray[float64]:
+    """Least gap (N,) in metres of pairs of capsules; negative where two overlap, infinite without pairs.
+
+    The ends of both capsules of a pair are among the points (N, P, 3) of a posture; `radii` are the sums of
+    the radii of each pair. Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
+    """
 
 # Several views at once
 

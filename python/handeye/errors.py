@@ -75,7 +75,7 @@ class InputError(HandeyeError):
 
 
 class UnstatedError(InputError):
-    """The files leave open what the robot's poses mean.
+    """The files leave open what the robot's poses mean, or what is stated of them is not so.
 
     Attributes
     ----------
@@ -85,8 +85,10 @@ class UnstatedError(InputError):
 
     default_code = "notation_unstated"
 
-    def __init__(self, message: str, *, hint: str, options: tuple[str, ...] = ()) -> None:
-        super().__init__(message, hint=hint)
+    def __init__(
+        self, message: str, *, hint: str, options: tuple[str, ...] = (), code: str | None = None
+    ) -> None:
+        super().__init__(message, hint=hint, code=code)
         self.options = options
 
 

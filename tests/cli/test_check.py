@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from commands import Handeye
-from folders import written
+from folders import photographed, written
 from handeye.errors import ExitCode
 from handeye.simulation.cells import CellOptions, ErrorKind, SimulatedCell, simulate_cell
 from handeye.studies.shift import picture
@@ -80,3 +80,18 @@ def test_diff(handeye: Handeye, cell: SimulatedCell, tmp_path: Path) -> None:
     assert (
         handeye("diff", one, written(beside.recording, tmp_path / "beside")).code == ExitCode.UNUSABLE_INPUT
     )
+
+
+def test_one_picture_where_the_arm_cannot_be_asked(handeye: Handeye, tmp_path: Path) -> None:
+    folder, _ = photographed(tmp_path / "views")
+    board = ("--rows", "5", "--columns", "7")
+    same = handeye("check", folder, folder / "im_03.png", "--at", "im_03", *board, "--json")
+    assert same.code == ExitCode.SUCCESS
+    assert same.data["told_apart"] is False
+    other = handeye("check", folder, folder / "im_05.png", "--at", "im_03", *board, "--json")
+    assert other.code == ExitCode.MOVED
+    assert "one picture does not tell which" in other.data["sentence"]
+    assert (
+        handeye.fails("check", folder, folder / "im_03.png", "--at", "none", *board)["code"] == "unknown_view"
+    )
+    assert handeye.fails("check", folder, "--at", "im_03", *board)["exit_code"] == ExitCode.USAGE

@@ -1,4 +1,4 @@
-"""Calls into the core: panics are ordinary exceptions, and Ctrl-C is heard while it works."""
+"""Calls into the core: wrong ones are refused, and Ctrl-C is heard while it works."""
 
 import os
 import signal
@@ -10,6 +10,7 @@ import pytest
 
 from cells import Cell
 from handeye import _core
+from handeye.errors import InputError
 from handeye.estimation import Measurements
 from handeye.robots import open_arm
 
@@ -37,14 +38,15 @@ def test_work_that_takes_an_hour_can_be_interrupted(work: Callable[[], None]) ->
         timer.cancel()
 
 
-def test_a_panic_is_an_ordinary_exception() -> None:
+def test_a_start_has_a_transform_for_each_camera_and_target() -> None:
     cell = Cell(np.random.default_rng(0))
     views = cell.views([cell.robot_pose(cell.look()) for _ in range(4)], sigma_px=0.1)
     measurements = Measurements.of(cell.mounting, cell.camera, cell.target, views)
     seen = _core.PoseMeasurements(measurements.problem, measurements.camera_poses, free_camera=None)
-    poses, none = measurements.motions, np.zeros((0, 4, 4))
+    poses, one = measurements.motions, np.eye(4)[np.newaxis]
     measured = [(0, 0, seen, [0, 1, 2, 3], [1.0] * 4)]
-    with pytest.raises(Exception, match=r"the core failed|start"):
-        _core.estimate_cell(
-            poses, [(True, 0, False, None)], [False], measured, start=(none, none), pairs=2, most_rounds=2
-        )
+    for start in ((one[:0], one[:0]), (one, one[:0]), (one[:0], one), (np.tile(one, (2, 1, 1)), one)):
+        with pytest.raises(InputError, match=r"a start of .* expected 1 and 1"):
+            _core.estimate_cell(
+                poses, [(True, 0, False, None)], [False], measured, start=start, pairs=2, most_rounds=2
+            )

@@ -7,8 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from datasets.layouts import RCT_FILES, some_recording, write_rct, write_rwhe
+from datasets.test_pose_pairs import easy_samples, moveit_samples, stations, visp_pose
 from handeye.datasets import load, read_poses, read_recording, write_recording
 from handeye.errors import InputError
+from handeye.types import Mounting
+from importing.test_streams import WRITERS, certifiable
 from strategies import mutated
 
 WORDS = [
@@ -21,6 +24,7 @@ WORDS = [
     b"id,u_px,v_px\n",
     b"1:30:00",
 ]
+LAYOUTS = ("easy_handeye2", "moveit", "visp", *WRITERS, "certifiable")
 EXAMPLES = settings(max_examples=3 * settings().max_examples)
 
 
@@ -71,6 +75,35 @@ def test_rwhe_calib(rwhe: Path, data: st.DataObject) -> None:
 @given(st.data())
 def test_robot_cal_tools(rct: Path, data: st.DataObject) -> None:
     attack(data, rct, list(RCT_FILES))
+
+
+@pytest.fixture(scope="module")
+def without_pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """One small set of every layout that has poses in the place of pictures."""
+    root = tmp_path_factory.mktemp("hostile")
+    listed = stations(Mounting.EYE_IN_HAND, 3)
+    times = [0.0, 0.1, 0.2]
+    streams = times, [pose for pose, _ in listed], times, [seen for _, seen in listed]
+    folders = {name: root / name for name in LAYOUTS}
+    for folder in folders.values():
+        folder.mkdir()
+    (folders["easy_handeye2"] / "a.samples").write_text(easy_samples(Mounting.EYE_IN_HAND))
+    (folders["moveit"] / "samples.yaml").write_text(moveit_samples(listed))
+    for k, (pose, seen) in enumerate(listed, start=1):
+        (folders["visp"] / f"pose_rPe_{k}.yaml").write_text(visp_pose(pose))
+        (folders["visp"] / f"pose_cPo_{k}.yaml").write_text(visp_pose(seen))
+    for name, write in WRITERS.items():
+        write(folders[name], streams)
+    certifiable(folders["certifiable"], listed)
+    return folders
+
+
+@given(st.data())
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_poses_without_pictures(without_pictures: dict[str, Path], name: str, data: st.DataObject) -> None:
+    folder = without_pictures[name]
+    names = [path.name for path in sorted(folder.iterdir())]
+    attack(data, folder, names, mounting=Mounting.EYE_IN_HAND)
 
 
 @EXAMPLES

@@ -76,3 +76,13 @@ def test_places_that_are_none(tmp_path: Path, path: str) -> None:
         load(tmp_path / path)
     with pytest.raises(InputError):
         load(path or tmp_path)
+
+
+@pytest.mark.parametrize("names", [("episode_0.parquet",), ("meta/info.json", "data/chunk-000/a.parquet")])
+def test_parquet_is_said_not_to_be_read(tmp_path: Path, names: tuple[str, ...]) -> None:
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(b"PAR1")
+    with pytest.raises(InputError) as caught:
+        load(tmp_path)
+    assert "Parquet is not read" in str(caught.value.hint)

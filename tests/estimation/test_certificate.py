@@ -6,9 +6,10 @@ from numpy.typing import NDArray
 
 from handeye import _core
 from handeye.errors import DegenerateError, InputError
-from handeye.estimation import solve
-from handeye.estimation.certificate import PoseProblem, certify, certify_calibration
+from handeye.estimation import solve, solve_rig
+from handeye.estimation.certificate import PoseProblem, certify, certify_calibration, certify_rig
 from handeye.simulation.cells import ErrorKind, simulate
+from handeye.simulation.rigs import simulate_rig
 
 Array = NDArray[np.float64]
 
@@ -94,6 +95,18 @@ def test_the_answer_of_solve_is_certified_and_lies_in_the_basin() -> None:
     assert data["certified"] is True
     assert data["moved_mm"] == pytest.approx(1e3 * found.moved_m)
     assert "no other answer" in found.sentence
+
+
+def test_the_answer_for_several_cameras_is_certified_and_another_is_not_taken_for_it() -> None:
+    rig = solve_rig(simulate_rig(ErrorKind.WHITE_FLANGE, 1))
+    found = certify_rig(rig)
+    assert found.certified
+    assert found.moved_m < 5e-3
+    assert len(found.X) == len(rig.cameras) > 1
+    assert len(found.Y) == len(rig.targets)
+    fit = rig.estimate.fit
+    for name, camera in zip(fit.measurements.cameras, found.X, strict=True):
+        np.testing.assert_allclose(camera, fit.X[name].matrix, atol=5e-3)
 
 
 def test_what_cannot_be_certified_is_refused() -> None:

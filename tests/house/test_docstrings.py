@@ -1,14 +1,24 @@
 """`help(handeye)` shows the way: every public name says what it is, with an example that runs."""
 
 import doctest
+import importlib
 import inspect
+import pkgutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import handeye
 
 NAMES = [name for name in handeye.__all__ if not name.startswith("__")]
+ROOMS = [
+    module.name
+    for module in pkgutil.iter_modules(handeye.__path__)
+    if module.ispkg and module.name not in {"cli", "benchmarks"}
+]
+# Rooms whose names all have an example; the others have one where it helps.
+WITH_EXAMPLES = {"types"}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -39,3 +49,25 @@ def test_the_package_names_what_it_offers() -> None:
     assert "handeye.solve" in text
     for name in NAMES:
         assert name in text, f"help(handeye) does not mention {name}"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_public_name_of_a_room_says_what_it_is_and_its_examples_run(
+    room: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    module = importlib.import_module(f"handeye.{room}")
+    report: list[str] = []
+    for name in getattr(module, "__all__", ()):
+        value = getattr(module, name)
+        if not (inspect.isclass(value) or inspect.isfunction(value)):
+            continue
+        text = value.__doc__
+        assert text, f"{room}.{name} has no docstring"
+        known = {**vars(module), "np": np} if room == "types" else {name: value}
+        test = doctest.DocTestParser().get_doctest(
+            inspect.cleandoc(text), known, f"{room}.{name}", None, None
+        )
+        assert test.examples or room not in WITH_EXAMPLES, f"{room}.{name} has no example"
+        failed = doctest.DocTestRunner().run(test, out=report.append).failed
+        assert failed == 0, "".join(report)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from bags_written import Journey, write
+from cli.test_verify import touched
 from commands import Handeye
 from datasets.test_pose_pairs import easy_samples
 from folders import made_recording, parallel_recording, written
@@ -105,7 +106,7 @@ def test_solve(handeye: Handeye, shipped: Path, tmp_path: Path) -> None:
 
 def test_solve_several_cameras(handeye: Handeye, tmp_path: Path) -> None:
     write_rig(simulate_rig(ErrorKind.MIXTURE_CELL, 1), tmp_path / "rig")
-    data = handeye.json("solve", tmp_path / "rig", "--robot", "ur5e")
+    data = handeye.json("solve", tmp_path / "rig", "--robot", "ur5e", "--certify")
     one = documented("handeye solve")
     for camera in data["cameras"].values():
         target = camera.pop("target")
@@ -274,6 +275,20 @@ def test_arm(handeye: Handeye, tmp_path: Path) -> None:
 def test_touch(handeye: Handeye) -> None:
     options = ("--cells", "1", "--touches", "3", "--workers", "1")
     compare("handeye study touch", handeye.json("study", "touch", *options))
+
+
+def test_verify(handeye: Handeye, tmp_path: Path) -> None:
+    recording, touches = touched(tmp_path, 0.0)
+    compare("handeye verify", handeye("verify", recording, touches, "--json").data)
+
+
+def test_studies_of_work(handeye: Handeye) -> None:
+    one = ("--workers", "1")
+    compare("handeye study shift", handeye.json("study", "shift", "--trials", "1", *one))
+    compare("handeye study probing", handeye.json("study", "probing", "--cells", "1", *one))
+    few = ("--arms", "1", "--views", "9", "--postures", "20")
+    compare("handeye study arm", handeye.json("study", "arm", *few, *one))
+    compare("handeye study cheap-arms", handeye.json("study", "cheap-arms", "--cells", "1", *one))
 
 
 def test_bench(handeye: Handeye) -> None:

@@ -93,21 +93,22 @@ def test_poses_four_decimals(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("case", "code"),
+    ("case", "code", "words"),
     [
-        ("angles_negated/neg_in_0_20_1_signs_negated", None),
-        ("mirrored_camera/mir_in_6_0", None),
-        ("gimbal_inverted/gimbal2_inv", None),
-        ("euler_conventions/conv_in_12_35_signs_negated", None),
-        ("euler_conventions/conv_in_12_35_ur_rotvec_as_rpy", None),
-        ("euler_conventions/conv_in_8_14_kuka_abc_as_rpy", None),
-        ("stale_robot_poses/stale_pairs", "v00 and v01, v02 and v03"),
-        ("stale_robot_poses/stale_all", "the pose was not read again"),
+        ("angles_negated/neg_in_0_20_1_signs_negated", "wrong_rotation", "have the wrong sign"),
+        ("mirrored_camera/mir_in_6_0", "mirrored_pictures", "left to right"),
+        ("gimbal_inverted/gimbal2_inv", "wrong_direction", "T_flange_base"),
+        ("euler_conventions/conv_in_12_35_signs_negated", "wrong_rotation", "have the wrong sign"),
+        ("euler_conventions/conv_in_12_35_ur_rotvec_as_rpy", "wrong_rotation", "are rotation vectors"),
+        ("euler_conventions/conv_in_8_14_kuka_abc_as_rpy", "wrong_rotation", "KUKA"),
+        ("stale_robot_poses/stale_pairs", "stale_poses", "v00 and v01, v02 and v03"),
+        ("stale_robot_poses/stale_all", "stale_poses", "the pose was not read again"),
     ],
 )
-def test_what_is_wrong_throughout_is_never_answered(case: str, code: str | None) -> None:
-    with pytest.raises(InputError, match=code or "."):
+def test_what_is_wrong_throughout_is_named(case: str, code: str, words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
         position_mm(CASES / case)
+    assert caught.value.code == code
 
 
 def test_zero_distortion_as_pinhole() -> None:

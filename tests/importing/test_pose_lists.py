@@ -64,6 +64,29 @@ def test_unstated_poses_are_told_by_the_pictures(
     assert caught.value.options == ("--poses", "poses.csv", "--notation", "ur", "--unit", "mm")
 
 
+@pytest.mark.parametrize(
+    ("written", "said", "unit", "code"),
+    [
+        ("kuka", "fanuc", Unit.MM, "wrong_rotation"),
+        ("doosan", "euler_zyx_moving_deg", Unit.MM, "wrong_rotation"),
+        ("fanuc", "euler_xyz_fixed_rad", Unit.MM, "wrong_unit"),
+        ("rotation_vector_deg", "rotation_vector", Unit.MM, "wrong_unit"),
+        ("matrix", "matrix", Unit.M, "wrong_unit"),
+    ],
+)
+def test_poses_stated_wrongly_are_told_by_the_pictures(
+    folder: Path, pictures: tuple[Path, Pose, list[Pose]], written: str, said: str, unit: Unit, code: str
+) -> None:
+    (folder / "poses.csv").write_text(table(written, Unit.MM)(names(folder), pictures[2]))
+    with pytest.raises(UnstatedError) as caught:
+        open_folder(folder, SourceOptions(camera=PICTURE_CAMERA, stated=Statement(NOTATIONS[said], unit)))
+    assert caught.value.code == code
+    _, _, _, name, _, found = caught.value.options
+    assert NOTATIONS[name].form == NOTATIONS[written].form
+    assert found == "mm"
+    assert "is stated to be" in caught.value.message
+
+
 def test_too_few_pictures_tell_nothing(folder: Path, pictures: tuple[Path, Pose, list[Pose]]) -> None:
     for name in names(folder)[2:]:
         (folder / name).unlink()

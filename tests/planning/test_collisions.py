@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from handeye.errors import InputError
-from handeye.planning.collisions import Body, Workspace, _segment_distance
+from handeye.planning.collisions import Body, Workspace
 from handeye.robots import open_arm
-from handeye.robots.frames import frames_of
 
 SPACE = Workspace(np.array([-2.0, -2.0, -1.0]), np.array([2.0, 2.0, 2.0]))
 
@@ -15,20 +14,7 @@ SPACE = Workspace(np.array([-2.0, -2.0, -1.0]), np.array([2.0, 2.0, 2.0]))
 def test_frames_end_at_the_flange(name: str) -> None:
     arm = open_arm(name)
     joints = np.random.default_rng(0).uniform(-1, 1, (5, len(arm)))
-    assert np.allclose(frames_of(arm, joints)[:, -1], arm.forward(joints), atol=1e-12)
-
-
-def test_distances_between_segments_are_those_of_a_fine_grid() -> None:
-    random = np.random.default_rng(1)
-    ends = random.normal(size=(4, 40, 3))
-    ends[1, :5] = ends[0, :5]  # points
-    ends[3, 5:10] = ends[2, 5:10] + (ends[1, 5:10] - ends[0, 5:10])  # parallel
-    found = _segment_distance(*ends)
-    s = np.linspace(0, 1, 201)[:, np.newaxis, np.newaxis]
-    first, second = (ends[i] + s * (ends[i + 1] - ends[i]) for i in (0, 2))
-    brute = np.linalg.norm(first[:, np.newaxis] - second[np.newaxis], axis=3).min(axis=(0, 1))
-    assert np.all(found <= brute + 1e-9)
-    assert np.allclose(found, brute, atol=2e-2)
+    assert np.allclose(arm.frames(joints)[:, -1], arm.forward(joints), atol=1e-12)
 
 
 def test_what_is_in_the_way_is_named() -> None:
@@ -59,6 +45,13 @@ def test_the_way_counts_as_well_as_its_ends() -> None:
     down = np.deg2rad([0, 210, 0, -90, 0, 0])  # the same posture as `right`, the other way round
     assert body.obstacles(down[np.newaxis]) == [None]
     assert body.obstacle_on_path(left, down) == "the arm would touch the floor"
+
+
+def test_a_floor_is_a_number() -> None:
+    for values in ({"floor_m": np.nan}, {"link_radius_m": np.inf}, {"tool_radius_m": np.nan}):
+        with pytest.raises(InputError, match="floor at") as caught:
+            Workspace(np.zeros(3), np.ones(3), **values)
+        assert "floor as a number" in (caught.value.hint or "")
 
 
 def test_a_workspace_has_an_inside() -> None:

@@ -13,11 +13,11 @@ from handeye.errors import DeviceError, InputError
 from handeye.estimation import solve
 from handeye.robots import ArmKinematics, open_arm
 from handeye.robots.protocol import Goal
-from handeye.session.attempt import Cell, Missed, attempt
+from handeye.session.attempt import Cell, Missed, Timeouts, attempt
 from handeye.session.calls import Calls
 from handeye.session.choosing import ArmChooser
 from handeye.session.configuration import Prepared, begin, prepare
-from handeye.session.deciding import EndReason
+from handeye.session.deciding import EndReason, Step
 from handeye.session.entry import Failure
 from handeye.session.faults import FaultRates
 from handeye.session.loop import End, Session
@@ -209,3 +209,30 @@ def test_refinement_can_be_left_away(tmp_path: Path) -> None:
     assert planned
     assert not any("refined" in decision for decision in planned)
     assert all(name.startswith("candidate_") for name in planned[0]["candidates"])
+
+
+@pytest.mark.parametrize("stood", [(0.1, 0.2, 0.3), (), (0.0,) * 9])
+def test_a_reading_of_another_length_in_an_old_journal_is_passed_over(
+    tmp_path: Path, stood: tuple[float, ...]
+) -> None:
+    session, store = begin(prepare(configured(0, most_views=6)), tmp_path / "s")
+    try:
+        while len(session.views) < 4:
+            step = session.next()
+            assert isinstance(step, Step)
+            last = session.take(step)
+        refused = replace(
+            last, number=last.number + 1, view=None, failure=Failure.MOTION_REFUSED, standing_rad=stood
+        )
+        store.append(refused)
+        step = session.next()
+        assert isinstance(step, Step)
+        assert session.take(step).view is not None
+    finally:
+        store.close()
+
+
+def test_settings_of_sessions_of_earlier_versions_are_read() -> None:
+    known = replace(configured(3), timeouts=Timeouts(move_s=7.0)).to_dict()
+    known["patience"] = known.pop("timeouts")
+    assert Configuration.from_dict(known).timeouts.move_s == 7.0

@@ -12,7 +12,7 @@ import pytest
 from handeye.cameras.protocol import Frame
 from handeye.errors import DeviceError
 from handeye.session import configuration as sessions
-from handeye.session.attempt import Patience
+from handeye.session.attempt import Timeouts
 from handeye.session.deciding import EndReason
 from handeye.session.entry import Failure
 from handeye.session.loop import End
@@ -59,7 +59,7 @@ def asked(controller: MockUniversalRobot, **changes: object) -> Configuration:
         "mock",
         workspace_m=SPACE,
         speed_rad_s=3.0,
-        patience=Patience(move_s=20, read_s=5, grab_s=5),
+        timeouts=Timeouts(move_s=20, read_s=5, grab_s=5),
     )
     return replace(usual, **changes)  # type: ignore[arg-type]
 

@@ -13,7 +13,7 @@ from handeye.errors import DeviceError, InputError
 from handeye.planning.collisions import Body
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Reading, Robot
-from handeye.session.attempt import Cell, Missed, Patience, Seen, attempt
+from handeye.session.attempt import Cell, Missed, Seen, Timeouts, attempt
 from handeye.session.choosing import ArmChooser
 from handeye.session.configuration import Prepared, begin, go_on, prepare
 from handeye.session.contract import check_at_rest
@@ -381,7 +381,7 @@ def test_a_robot_that_hangs_ends_the_session_and_it_goes_on_later(tmp_path: Path
     import threading
 
     prepared, robot = watched(5)
-    patience = Patience(move_s=0.1, read_s=0.1, grab_s=5.0)
+    timeouts = Timeouts(move_s=0.1, read_s=0.1, grab_s=5.0)
     moves, back = robot.move_to, threading.Event()
 
     def hangs(goal: Goal) -> None:
@@ -391,7 +391,7 @@ def test_a_robot_that_hangs_ends_the_session_and_it_goes_on_later(tmp_path: Path
             moves(goal)
 
     robot.move_to = hangs  # type: ignore[method-assign]
-    hanging = replace(prepared, cell=replace(prepared.cell, patience=patience))
+    hanging = replace(prepared, cell=replace(prepared.cell, timeouts=timeouts))
     session, store = begin(hanging, tmp_path / "s")
     end = session.run()
     store.close()

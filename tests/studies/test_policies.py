@@ -1,9 +1,12 @@
 """Policies in the same cells: lattices as described, paired noise, equal budgets; gains that correlate."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from handeye import _core
+from handeye.compute.checkpoint import Checkpoint
 from handeye.errors import InputError
 from handeye.robots.simulated import ArmErrors
 from handeye.studies.gains import QUANTITIES, GainScatter, study_gains
@@ -73,16 +76,19 @@ def test_a_correlation_is_that_of_the_mean_over_the_draws() -> None:
     random = np.random.default_rng(5)
     gains = random.uniform(1, 4, 40)
     noise = random.normal(0, 6, (40, 400))
-    found = dict.fromkeys(QUANTITIES, gains[:, None] + noise)
-    scatter = GainScatter({"entropy": gains, "entropy_handeye": -gains}, found)
+    found = dict.fromkeys(QUANTITIES, tuple(map(tuple, (gains[:, None] + noise).tolist())))
+    scatter = GainScatter({"entropy": tuple(gains), "entropy_handeye": tuple(-gains)}, found)
     expected, single = scatter.correlations("entropy", "log_error")
     assert expected > 0.9
     assert 0.05 < single < 0.3
     assert scatter.correlations("entropy_handeye", "rmse_px")[0] < -0.9
 
 
-def test_gains_are_paired_with_what_candidates_bring() -> None:
-    document = study_gains(trials=1, candidates=4, draws=2, arm="exact").to_dict()
+def test_gains_are_paired_with_what_candidates_bring(tmp_path: Path) -> None:
+    kept = Checkpoint(tmp_path, 1)
+    document = study_gains(trials=1, candidates=4, draws=2, arm="exact", workers=kept).to_dict()
+    again = study_gains(trials=1, candidates=4, draws=2, arm="exact", workers=kept).to_dict()
+    assert again == document
     assert (document["starts"], document["candidates"], document["draws"]) == (1, 4, 2)
     for part in document["correlation"].values():
         assert all(-1 <= found["expected_median"] <= 1 for found in part.values())

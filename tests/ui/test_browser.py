@@ -14,16 +14,19 @@ import numpy as np
 import pytest
 
 from browsers import NARROW, Window, browser, needs_browser
+from handeye.datasets import write_rig
 from handeye.datasets.shipped import shipped_recording
 from handeye.notations import NOTATIONS, pose_text, read_pose_text
 from handeye.robots.protocol import Goal
 from handeye.session.configuration import prepare
 from handeye.session.settings import Configuration
+from handeye.simulation.cells import ErrorKind
+from handeye.simulation.rigs import simulate_rig
 
 pytestmark = needs_browser
 QUICK = ("--points-only", "0.1")
 # Nothing ends it by itself before a busy machine has pressed a button.
-LONG = ("--accuracy-mm", "0.001", "--max-views", "400")
+LONG = ("--accuracy-mm", "0.001", "--max-views", "400", "--anyway")
 SERIOUS = {"serious", "critical"}
 
 
@@ -212,7 +215,7 @@ def test_by_hand_with_typed_poses_and_brought_pictures(opened: Any, tmp_path: Pa
     assert found["end"] == "by_hand"
 
 
-@pytest.mark.parametrize("words", [("solve",), ("plan", "--first", "4"), ("ui",)])
+@pytest.mark.parametrize("words", [("solve",), ("plan", "--first", "4"), ("ui",), ("replay",)])
 def test_pages_about_a_folder(opened: Any, words: tuple[str, ...]) -> None:
     from playwright.sync_api import expect
 
@@ -226,9 +229,32 @@ def test_pages_about_a_folder(opened: Any, words: tuple[str, ...]) -> None:
         first.click()
         expect(one.page.locator("#picture-text")).to_contain_text(f"{name}: ")
         assert is_painted(one, "#scene")
+        if words[0] == "replay":
+            expect(one.page.locator("#key")).to_have_text("as taken planned")
         if words[0] == "plan":
             one.page.click("summary")
             expect(one.page.locator("#candidates li").first).to_contain_text("(next)")
+        one.check()
+
+
+def test_all_cameras_of_a_rig(opened: Any, tmp_path: Path) -> None:
+    from playwright.sync_api import expect
+
+    recording = simulate_rig(ErrorKind.WHITE_FLANGE, 2)
+    write_rig(recording, tmp_path / "rig")
+    with command("solve", tmp_path / "rig", "--ui") as (address, _):
+        one = opened(address)
+        state(one, rf"{len(recording.cameras)} cameras, \d+ stations")
+        for name in recording.cameras:
+            expect(one.page.locator("#now")).to_contain_text(f"{name}: within ")
+            expect(one.page.locator("#coverage")).to_contain_text(f"of the picture of {name}")
+        name = list(recording.cameras)[-1]
+        one.page.locator("#views button", has_text=f"{name} / ").first.click()
+        expect(one.page.locator("#picture-text")).to_contain_text(re.compile(rf"{name} / .*px RMS"))
+        expect(one.page.locator("#limits")).to_have_text(re.compile("What limits the accuracy of "))
+        assert is_painted(one, "#scene")
+        one.page.set_viewport_size({"width": NARROW[0], "height": NARROW[1]})
+        assert one.page.evaluate("document.documentElement.scrollWidth") <= NARROW[0]
         one.check()
 
 

@@ -1,6 +1,7 @@
 //! One piece of work, done as often as asked, for a tool that counts instructions: `counted CASE REPEATS`.
 //!
-//! Without arguments it names the cases. See `tools/count_instructions.py`.
+//! Without arguments it names the cases. See `tools/count_instructions.py`. `counted gains UNIT` writes what is scored
+//! there instead, 17 digits a candidate, for `tools/compare_gains.py`: two machines must agree.
 
 #![expect(clippy::disallowed_methods, clippy::disallowed_macros, reason = "a program, not the library")]
 
@@ -94,6 +95,21 @@ fn count_solve(repeats: usize, views: usize, points: u32, distorted: bool) {
 }
 
 fn count_score(repeats: usize, points: u32, distorted: bool, noisy: bool, unit: VectorUnit) {
+    score(points, distorted, noisy, unit, &mut |gains| {
+        for _ in 0..repeats {
+            black_box(gains());
+        }
+    });
+}
+
+/// Sets up a case and hands over what scores it.
+fn score(
+    points: u32,
+    distorted: bool,
+    noisy: bool,
+    unit: VectorUnit,
+    run: &mut dyn FnMut(&dyn Fn() -> Vec<f64>),
+) {
     let mut scene = Scene::new(distorted, points);
     let (problem, start) = scene.problem(8);
     let solution = solved(&problem, &start);
@@ -119,10 +135,23 @@ fn count_score(repeats: usize, points: u32, distorted: bool, noisy: bool, unit: 
         },
     };
     let execution = Execution { unit, threads: 1 };
-    for _ in 0..repeats {
+    run(&|| {
         let gains =
             model.gains_by(&belief, &Entropy, Motions::Matrices(black_box(&motions)), None, &execution);
-        black_box(gains.expect("rigid motions"));
+        gains.expect("rigid motions")
+    });
+}
+
+fn print_gains(unit: &str) {
+    let unit = VectorUnit::ALL.into_iter().find(|u| u.name() == unit).expect("the name of a unit");
+    for (points, distorted, noisy) in
+        [(16, false, false), (88, false, false), (88, true, false), (88, true, true)]
+    {
+        score(points, distorted, noisy, unit, &mut |gains| {
+            for gain in gains() {
+                println!("{gain:.16e}");
+            }
+        });
     }
 }
 
@@ -150,6 +179,9 @@ fn main() {
         return;
     }
     let [_, name, repeats] = &arguments[..] else { panic!("counted CASE REPEATS") };
+    if name == "gains" {
+        return print_gains(repeats);
+    }
     let (_, run) = CASES.iter().find(|(case, _)| case == name).expect("a case that counted names");
     run(repeats.parse().expect("a number"));
 }

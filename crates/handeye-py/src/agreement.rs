@@ -82,12 +82,20 @@ impl Agreement {
         let cell = Cell {
             stations: stations
                 .iter()
-                .map(|pose| Station { pose: *pose, joints: None, velocity: None, links: None })
+                .map(|pose| Station {
+                    pose: *pose,
+                    joints: None,
+                    velocity: None,
+                    links: None,
+                    approach: None,
+                })
                 .collect(),
             cameras: vec![seen_by(py, camera)?],
             targets: vec![body(!on_flange)],
             board_scale: true,
             measurements,
+            tips: vec![],
+            touches: vec![],
         };
         let guess = (vec![convert::transform(py, "X", &x)?], vec![convert::transform(py, "Y", &y)?]);
         let inner = CoreAgreement::new(&cell, guess).map_err(|e| to_python(py, e))?;

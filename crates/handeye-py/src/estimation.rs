@@ -3,12 +3,12 @@
 use crate::call::CallCore;
 use handeye_core::estimation::{
     Assumptions, Body, CameraPrior, Cell, Measurement, Options, PoseMeasurement, Posterior as CorePosterior,
-    SeenBy, Station, WeakPrior, compress, estimate, relative_weights, shared_error, shrunk_variances,
-    start_from_poses, start_of_cell,
+    SeenBy, Station, Tip, Touch, TouchPoint, WeakPrior, compress, estimate, relative_weights, shared_error,
+    shrunk_variances, start_from_poses, start_of_cell,
 };
 use handeye_core::least_squares::{PixelParameters, Problem as CoreProblem};
 use handeye_core::se3::Se3;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
@@ -216,6 +216,39 @@ type ArmGiven<'py> = (Array<'py>, Array<'py>, Vec<f64>, Vec<usize>, Vec<bool>);
 /// Camera, target, measurements, and for each of these its station and pixel variance.
 type SeenGiven<'py> = (usize, usize, Bound<'py, PoseMeasurements>, Vec<usize>, Vec<f64>);
 
+/// A tip: whether it is on the flange, where, and how well that is known.
+type TipGiven<'py> = (bool, Array<'py>, Array<'py>);
+/// A touch: its station, one tip or two, where there is one the target and the point of it, and its covariance.
+type TouchGiven<'py> = (usize, Vec<usize>, Option<(usize, Array<'py>)>, Array<'py>);
+
+fn point(py: Python<'_>, what: &str, given: &Array<'_>) -> PyResult<Vector3<f64>> {
+    let values = convert::scalars(py, what, given)?;
+    let [x, y, z] = values[..] else { return Err(invalid(py, &format!("{what}: three numbers are needed"))) };
+    Ok(Vector3::new(x, y, z))
+}
+
+fn three_by_three(py: Python<'_>, what: &str, given: &Array<'_>) -> PyResult<Matrix3<f64>> {
+    let m = square(py, what, given)?;
+    if m.nrows() != 3 {
+        return Err(invalid(py, &format!("{what}: three rows are needed")));
+    }
+    Ok(Matrix3::from_column_slice(m.as_slice()))
+}
+
+fn tip(py: Python<'_>, (on_flange, at, information): TipGiven<'_>) -> PyResult<Tip> {
+    let at = point(py, "tip", &at)?;
+    Ok(Tip { body: body(on_flange), at, information: three_by_three(py, "tip's information", &information)? })
+}
+
+fn touch(py: Python<'_>, (station, tips, target, covariance): TouchGiven<'_>) -> PyResult<Touch> {
+    let mut points: Vec<TouchPoint> = tips.into_iter().map(TouchPoint::Tip).collect();
+    if let Some((target, at)) = target {
+        points.push(TouchPoint::OfTarget { target, at: point(py, "touched point", &at)? });
+    }
+    let points = <[TouchPoint; 2]>::try_from(points).map_err(|_| invalid(py, "a touch is of two points"))?;
+    Ok(Touch { station, points, covariance: three_by_three(py, "covariance of a touch", &covariance)? })
+}
+
 /// A camera from what was given of it.
 pub fn seen_by(
     py: Python<'_>,
@@ -240,8 +273,8 @@ pub fn body(on_flange: bool) -> Body {
 /// The posterior of a cell; see the type stub.
 #[pyfunction]
 #[pyo3(signature = (
-    stations, cameras, targets, seen, *, velocities=None, arm=None, exact_robot=false, board_scale=false, start=None,
-    pairs, most_rounds,
+    stations, cameras, targets, seen, *, velocities=None, arm=None, approach=None, exact_robot=false, roughness=1.0, board_scale=false, start=None,
+    tips=vec![], touches=vec![], pairs, most_rounds,
 ))]
 #[expect(clippy::too_many_arguments, reason = "one argument per part of a cell")]
 fn estimate_cell<'py>(
@@ -252,15 +285,24 @@ fn estimate_cell<'py>(
     seen: Vec<SeenGiven<'py>>,
     velocities: Option<Array<'py>>,
     arm: Option<ArmGiven<'py>>,
+    approach: Option<Array<'py>>,
     exact_robot: bool,
+    roughness: f64,
     board_scale: bool,
     start: Option<(Array<'py>, Array<'py>)>,
+    tips: Vec<TipGiven<'py>>,
+    touches: Vec<TouchGiven<'py>>,
     pairs: usize,
     most_rounds: usize,
 ) -> PyResult<Posterior> {
     let poses = convert::transforms(py, "stations", &stations)?;
-    let mut assumptions =
-        Assumptions { exact_robot, joint_scales: vec![], free_joints: vec![], link_lengths: vec![] };
+    let mut assumptions = Assumptions {
+        exact_robot,
+        roughness,
+        joint_scales: vec![],
+        free_joints: vec![],
+        link_lengths: vec![],
+    };
     let mut of_arm = None;
     if let Some((joints, links, scales, free, lengths)) = arm {
         let (joints, links) = (jacobian_list(py, &joints)?, jacobian_list(py, &links)?);
@@ -275,6 +317,10 @@ fn estimate_cell<'py>(
     if velocities.as_ref().is_some_and(|v| v.len() != poses.len()) {
         return Err(invalid(py, "velocities must be as many as stations"));
     }
+    let approach = approach.map(|a| jacobian_list(py, &a)).transpose()?;
+    if approach.as_ref().is_some_and(|a| a.len() != poses.len()) {
+        return Err(invalid(py, "approaches must be as many as stations"));
+    }
     let stations = poses
         .iter()
         .enumerate()
@@ -283,6 +329,7 @@ fn estimate_cell<'py>(
             velocity: velocities.as_ref().map(|v| v[k]),
             joints: of_arm.as_ref().map(|(joints, _): &(Vec<_>, Vec<_>)| joints[k].clone()),
             links: of_arm.as_ref().map(|(_, links)| links[k].clone()),
+            approach: approach.as_ref().map(|a| a[k].clone()),
         })
         .collect();
     let cameras = cameras.into_iter().map(|camera| seen_by(py, camera)).collect::<PyResult<Vec<_>>>()?;
@@ -309,6 +356,8 @@ fn estimate_cell<'py>(
         targets: targets.into_iter().map(body).collect(),
         board_scale,
         measurements,
+        tips: tips.into_iter().map(|one| tip(py, one)).collect::<PyResult<_>>()?,
+        touches: touches.into_iter().map(|one| touch(py, one)).collect::<PyResult<_>>()?,
     };
     let given = start
         .map(|(x, y)| {

@@ -1,7 +1,9 @@
 //! Serial arms, batched.
 
 use crate::call::CallCore;
-use handeye_core::kinematics::{Chain as CoreChain, Frame, InverseOptions, Joint, JointKind};
+use handeye_core::kinematics::{
+    CapsulePair, Chain as CoreChain, Frame, InverseOptions, Joint, JointKind, least_gaps as core_least_gaps,
+};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
@@ -10,6 +12,7 @@ use crate::errors::{invalid, to_python};
 
 /// Registers the class of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(least_gaps, module)?)?;
     module.add_class::<Chain>()
 }
 
@@ -19,6 +22,30 @@ fn frame_of(py: Python<'_>, name: &str) -> PyResult<Frame> {
         "flange" => Ok(Frame::Flange),
         other => Err(invalid(py, &format!("frame must be base or flange, found \"{other}\""))),
     }
+}
+
+/// Least gap `(N,)` in metres of pairs of capsules with ends among points `(N, P, 3)`: pairs `(C, 4)` of first ends, last
+/// ends, and the sum of radii `(C,)` of each pair.
+#[pyfunction]
+fn least_gaps<'py>(
+    py: Python<'py>,
+    points: Array<'py>,
+    pairs: Vec<[usize; 4]>,
+    radii: Vec<f64>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let shape = points.shape().to_vec();
+    if shape.len() != 3 || shape[2] != 3 || pairs.len() != radii.len() {
+        return Err(invalid(py, &format!("points (N, P, 3) and as many radii as pairs, found {shape:?}")));
+    }
+    let entries = convert::in_place(&points);
+    let points: Vec<_> = entries.chunks_exact(3).map(|p| [p[0], p[1], p[2]].into()).collect();
+    let pairs: Vec<_> = pairs
+        .into_iter()
+        .zip(radii)
+        .map(|([a, b, c, d], radii)| CapsulePair { one: [a, b], other: [c, d], radii })
+        .collect();
+    let gaps = py.core(|| core_least_gaps(&points, shape[1], &pairs))?.map_err(|e| to_python(py, e))?;
+    Ok(convert::array(py, &[gaps.len()], gaps))
 }
 
 /// A serial arm.
@@ -90,6 +117,19 @@ impl Chain {
             })?
             .map_err(|e| to_python(py, e))?;
         Ok(convert::array(py, &[count, 4, 4], poses))
+    }
+
+    /// Poses `(N, n + 2, 4, 4)` in the base at joints `(N, n)`: the base itself, each joint, the flange.
+    fn frames<'py>(&self, py: Python<'py>, joints: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let (count, values) = self.configurations(py, &joints)?;
+        let each = self.inner.len() + 2;
+        let frames = py
+            .core(|| {
+                let mut frames = vec![0.0; count * each * 16];
+                self.inner.frames_all(&values, &mut frames).map(|()| frames)
+            })?
+            .map_err(|e| to_python(py, e))?;
+        Ok(convert::array(py, &[count, each, 4, 4], frames))
     }
 
     /// Jacobians `(N, 6, n)` at joints `(N, n)`, in the frame "base" or "flange".

@@ -52,7 +52,7 @@ _STAGES: tuple[tuple[str, object, str], ...] = (
     ("scoring", Prediction, "gains"),
     ("refinement", choosing, "refine"),
     ("choice", Planner, "ask"),
-    ("writing", taking, "encoded"),
+    ("writing", taking, "png_bytes"),
     ("writing", SessionStore, "keep_image"),
     ("writing", SessionStore, "append"),
 )

@@ -13,6 +13,7 @@ COMMANDS = (
     ("validate", "handeye.cli.validate:validate", "Test how far a calibration holds."),
     ("replay", "handeye.cli.replay:replay", "Go through old data: what each view brought."),
     ("check", "handeye.cli.check:check", "Test whether camera, board and arm still are where they were."),
+    ("verify", "handeye.cli.verify:verify", "Compare a calibration with points that were touched."),
     ("diff", "handeye.cli.diff:diff", "Say how two calibrations of one camera differ."),
     ("arm", "handeye.cli.corrected:corrected", "Write the arm as it is built, as the views have it."),
     ("import", "handeye.cli.importing:import_folder", "Turn images and robot poses into a recording."),
@@ -43,7 +44,8 @@ def make_app(named: str = "") -> App:
         help_format="markdown" if named else "plaintext",
         help_epilogue="handeye COMMAND --help explains a command. Exit codes: 0 good, 1 mistake in handeye, "
         "2 usage, 3 unusable input, 4 degenerate geometry, 5 failed detection, 6 not solved, "
-        "7 cannot write, 8 robot or camera failed, 9 something has moved, 130 interrupted.",
+        "7 cannot write, 8 robot or camera failed, 9 something has moved or is not as stated, "
+        "130 interrupted.",
         version=version,
         default_parameter=Parameter(negative=()),
         result_action="return_value",

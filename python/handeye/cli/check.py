@@ -1,5 +1,6 @@
 """`handeye check`: whether camera, board and arm still are where the calibration says."""
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,10 +12,13 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_output, check_picture, write_figure, write_json
 from handeye.cli.source import Source
 from handeye.datasets.check_log import LoggedCheck, append_check, change_of, read_check_log
-from handeye.errors import ExitCode
+from handeye.datasets.images import read_image
+from handeye.detection import NotFound, detect
+from handeye.errors import ExitCode, InputError
 from handeye.estimation import Estimate, Measurements, make_estimator, require_determined
 from handeye.estimation.faults import examine
 from handeye.estimation.shift import Check, check_views, plan_check
+from handeye.types import Recording, View
 from handeye.types.calibration import MM_PER_M, ModelName
 
 if TYPE_CHECKING:
@@ -29,6 +33,7 @@ def check(
     /,
     *,
     plan: int | None = None,
+    at: str | None = None,
     log: Path | None = None,
     picture: Path | None = None,
     output: Path | None = None,
@@ -47,7 +52,10 @@ def check(
         Folder with the views of the calibration.
     views
         Folder with new views of the same board through the same camera; two are enough if they are the ones
-        that were planned.
+        that were planned. Or one picture, with --at.
+    at
+        Name of a view of the calibration: the picture was taken with the arm there. For an arm that cannot be
+        asked where it stands. One picture shows that something moved, not what.
     plan
         Without views: how many poses to choose, at least two.
     log
@@ -65,6 +73,8 @@ def check(
             raise UsageError("--picture draws the log, and --log is missing")
     if (views is not None and plan is not None) or (plan is not None and plan < PLANNED):
         raise UsageError("--plan chooses at least two poses for a check, and goes without views")
+    if at is not None and views is None:
+        raise UsageError("--at says where a picture was taken, and no picture is given")
     if views is None and log is not None:
         raise UsageError("--log keeps checks, and no views are given to check with")
     opened = source.open(calibrated, arm.described())
@@ -75,12 +85,42 @@ def check(
     if views is None:
         answer = _planned(estimate, known, plan or PLANNED, opened.recording.name)
     else:
-        new = source.open(views, arm.described()).recording
-        measured = Measurements.of(estimate.mounting, estimate.camera, estimate.target, new.views)
+        if at is not None:
+            new = (_pictured(views, at, opened.recording),)
+        else:
+            new = source.open(views, arm.described()).recording.views
+        measured = Measurements.of(estimate.mounting, estimate.camera, estimate.target, new)
         answer = _checked(check_views(estimate, measured), opened.recording.name, log, picture)
     if output is not None:
         write_json(output, answer.data)
     return answer
+
+
+def _pictured(picture: Path, at: str, recording: Recording) -> View:
+    """Find the board in one picture, taken where a view of the calibration was.
+
+    Raises
+    ------
+    InputError
+        No such view, or a picture of another size than the camera's.
+    DetectionError
+        The board is not in it.
+    """
+    there = next((view for view in recording.views if view.name == at), None)
+    if there is None:
+        names = ", ".join(view.name for view in recording.views)
+        raise InputError(f"no view {at[:100]!r}", code="unknown_view", hint=f"views are {names[:300]}")
+    image = read_image(picture)
+    width, height = recording.camera.size_px
+    if image.shape != (height, width):
+        raise InputError(
+            f"{picture}: {image.shape[1]} x {image.shape[0]} px, the camera has {width} x {height}",
+            code="wrong_image_size",
+        )
+    found = detect(image, recording.target)
+    if isinstance(found, NotFound):
+        raise found.error(picture.name)
+    return replace(there, name=f"at_{at}", point_ids=found.point_ids, pixels=found.pixels, sigmas_px=None)
 
 
 def _planned(estimate: Estimate, known: Measurements, count: int, name: str) -> Answer:

@@ -1,9 +1,10 @@
 """`handeye arm`: the arm as it is built, as the views have it."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 
 from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
@@ -11,10 +12,15 @@ from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output
 from handeye.cli.source import Source
+from handeye.datasets.reading import MIB, read_text
 from handeye.datasets.writing import replace_file
 from handeye.errors import DegenerateError
-from handeye.estimation import solve
-from handeye.robots.corrected import corrected_arm, urdf_of
+from handeye.estimation import Measurements, make_estimator, solve
+from handeye.estimation.arm_observability import observability_indices
+from handeye.estimation.faults import examine
+from handeye.planning.prediction import Prediction, Sight
+from handeye.robots import ArmKinematics
+from handeye.robots.formats import ARM_FORMATS, CorrectedArm
 from handeye.types.calibration import ModelName
 
 if TYPE_CHECKING:
@@ -26,11 +32,13 @@ def corrected(
     /,
     *,
     output: Path,
+    format: Annotated[str, Parameter(name="--format")] = "urdf",  # noqa: A002 - the word of `export` too
+    previous: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
-    """Write the arm as it is built: its URDF with joints as the views have them, and the zeros of its joints.
+    """Write the arm as it is built, as the views have it: joints as they sit, or the zeros of its joints.
 
     Only what the views determine is changed, the rest stays near the description: it holds near the
     postures that were seen. Offsets of the first and last joint only say where base and flange are, and stay.
@@ -40,9 +48,17 @@ def corrected(
     folder
         Folder with the views; every one with joint positions.
     output
-        The URDF. Joints, without shapes and masses.
+        The file to write.
+    format
+        urdf, xacro, ur (the calibration.yaml of Universal Robots' ROS driver), dh, dh_modified; zeros of
+        joints alone: fanuc, kuka, abb, lerobot.
+    previous
+        The calibration file that lerobot changes.
     """
     check_output(output)
+    chosen = ARM_FORMATS.get(format)
+    if chosen is None:
+        raise UsageError(f"no format {format[:80]!r}", hint=f"formats are {', '.join(ARM_FORMATS)}")
     described = arm.described()
     if described is None:
         raise UsageError("--robot is missing", hint="name the arm whose description is put right")
@@ -50,25 +66,36 @@ def corrected(
     kinematics = arm.kinematics(opened.recording.views, ModelName.AUTO)
     if kinematics is None:
         raise AssertionError  # an arm is described
+    known = examine(Measurements.of_recording(opened.recording)).measurements
     calibration = solve(opened.recording, kinematics=kinematics)
     correction = calibration.arm_correction
     if correction is None:
         raise DegenerateError("the views say nothing of the arm")
     twists = kinematics.link_twists @ correction.displacements
-    built = corrected_arm(described, twists, correction.joint_offsets)
     joints = np.array([view.joints_rad or () for view in opened.recording.views], dtype=float)
-    moved = (built.forward(joints) - described.forward(joints))[:, :3, 3]
     note = f"{described.name} as {len(calibration.used)} views of {opened.recording.name} have it, by handeye"
-    replace_file(output, urdf_of(built, [note]).encode())
+    before = None if previous is None else read_text(previous, MIB)
+    found = CorrectedArm(described, twists, correction.joint_offsets, (note,), before)
+    built = found.built
+    moved = (built.forward(joints) - described.forward(joints))[:, :3, 3]
+    replace_file(output, chosen.text(found).encode())
     data: dict[str, Any] = {
         "recording": opened.recording.name,
         "arm": described.name,
-        "urdf": str(output),
+        "format": chosen.name,
+        "file": str(output),
         "joint_zeros": [offset.to_dict() for offset in calibration.joint_offsets],
         "link_errors": [error.to_dict() for error in calibration.link_errors],
+        "observability": _observability(known, kinematics),
         "flange_moves_mm": 1e3 * float(np.linalg.norm(moved)) / len(moved) ** 0.5,
     }
     return Answer(data, lambda console: _show(console, data))
+
+
+def _observability(known: Measurements, kinematics: ArmKinematics) -> dict[str, float]:
+    estimate = make_estimator(ModelName.AUTO, kinematics)(known)
+    told = Prediction(estimate, Sight(known=True)).informations(known.motions, known.joints)
+    return observability_indices(estimate, told).to_dict()
 
 
 def _show(console: "Console", data: dict[str, Any]) -> None:
@@ -83,5 +110,7 @@ def _show(console: "Console", data: dict[str, Any]) -> None:
     rows.append(
         ("flange", f"stands {data['flange_moves_mm']:.2f} mm from where it is described, root mean square")
     )
+    indices = ", ".join(f"{name.upper()} {value:.3g}" for name, value in data["observability"].items())
+    rows.append(("observability", indices))
     pairs(console, rows, indent=2)
-    console.print(f"written: {data['urdf']}", markup=False, soft_wrap=True)
+    console.print(f"written: {data['file']}", markup=False, soft_wrap=True)

@@ -33,7 +33,7 @@ def expect(
     mounting: Mounting = Mounting.EYE_IN_HAND,
     distance_mm: tuple[float, float] = (250.0, 900.0),
     tilt_deg: float = 45.0,
-    cells: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1000))] = 6,
+    cells: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1000))] | None = None,
     workers: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
     board: Board = Board(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
@@ -62,11 +62,12 @@ def expect(
     tilt_deg
         Largest angle at which the target is seen.
     cells
-        Number of cells that are simulated.
+        Number of cells that are simulated; without it so many that their mean is known to about a tenth.
     workers
         Processes. The result does not depend on it.
     """
     from handeye.session.settings import Configuration  # noqa: PLC0415 - help need not wait for it
+    from handeye.studies.expectation import CELLS  # noqa: PLC0415
     from handeye.studies.expectation import expect as foretell  # noqa: PLC0415
 
     target, pattern = board.described()
@@ -81,7 +82,9 @@ def expect(
         simulation=replace(Simulated(arm_errors=arm_errors).simulation(), points_only=pixel_sigma),
     )
     with progress("Simulating cells") as advance:
-        found = foretell(configuration, views, target=target, cells=cells, workers=workers, progress=advance)
+        found = foretell(
+            configuration, views, target=target, cells=cells or CELLS, workers=workers, progress=advance
+        )
     data = _data(found)
     return Answer(data, lambda console: _show(console, found))
 

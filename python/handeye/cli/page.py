@@ -10,8 +10,8 @@ from cyclopts import Parameter, validators
 
 from handeye.datasets.writing import write_file
 from handeye.errors import InputError
-from handeye.estimation import Estimate, Measurements
-from handeye.importing import Opened
+from handeye.estimation import Estimate, Measurements, RigCalibration
+from handeye.importing import Opened, OpenedRig
 from handeye.robots import Arm
 from handeye.session import End, Session, SessionStore
 from handeye.session.drivers import MANUAL, Person
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from handeye.session.prepared import Prepared
     from handeye.ui import Server
 
+# Numbers of views, and the radii in mm and deg that were stated after so many.
+Curve = tuple[tuple[int, float, float], ...]
 # How the formats that a folder is watched for begin.
 _BEGINNINGS = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg", b"BM": "bmp", b"II*\x00": "tif", b"MM\x00*": "tif"}
 
@@ -102,6 +104,8 @@ def show_views(
     description: str | None = None,
     considered: "Considered | None" = None,
     chosen: str | None = None,
+    known: Curve = (),
+    planned: Curve = (),
 ) -> "Server":
     """Serve a page about views that are there already, and return its server."""
     from handeye.ui import Hub, Server, Still  # noqa: PLC0415 - other commands need no server
@@ -118,8 +122,29 @@ def show_views(
         estimate,
         considered=considered,
         chosen=chosen,
+        known=known,
+        planned=planned,
         rejected={**measurements.rejected, **dict(opened.missed)},
     )
+    still = Still(hub, shown, opened.folder, opened.recording.name, description)
+    return Server(hub, page.ui_host, page.ui_port, pictures=still)
+
+
+def show_rig(
+    page: Page, opened: OpenedRig, rig: RigCalibration, *, arm: Arm | None, description: str | None
+) -> "Server":
+    """Serve a page about all cameras of a rig, and return its server."""
+    from handeye.ui import Hub, Server, Still  # noqa: PLC0415 - other commands need no server
+    from handeye.ui.rigs import shown_rig  # noqa: PLC0415
+
+    def rejected(camera: str, target: str) -> dict[str, str]:
+        measured = rig.estimate.fit.measurements.pairs[camera, target]
+        return {**measured.rejected, **dict(opened.missed.get(camera, {}))}
+
+    hub = Hub()
+    joints = [station.joints_rad for station in opened.recording.stations]
+    known = arm if all(q is not None for q in joints) else None
+    shown = shown_rig(rig.estimate.fit.measurements, rig.estimate, known, rejected)
     still = Still(hub, shown, opened.folder, opened.recording.name, description)
     return Server(hub, page.ui_host, page.ui_port, pictures=still)
 

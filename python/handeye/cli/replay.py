@@ -1,5 +1,6 @@
 """`handeye replay`: what a recording brought, view by view, and what planning would have made of it."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -7,11 +8,14 @@ from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
+from handeye.cli.page import Curve, Page, serve, show_views
 from handeye.cli.progress import progress
 from handeye.cli.source import Source
 from handeye.estimation import Measurements, make_estimator
 from handeye.estimation.faults import examine
-from handeye.planning.hindsight import hindsight
+from handeye.importing import Opened
+from handeye.planning.hindsight import START, After, Hindsight, hindsight
+from handeye.robots import ArmKinematics
 from handeye.types.calibration import ModelName
 
 if TYPE_CHECKING:
@@ -25,6 +29,7 @@ def replay(
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
+    page: Page = Page(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Go through old data again: what was known after each view, and what planning would have made of it.
@@ -48,7 +53,37 @@ def replay(
     data: dict[str, Any] = {"recording": opened.recording.name, "views": len(known), **found.to_dict()}
     if output is not None:
         write_json(output, data)
-    return Answer(data, lambda console: _show(console, data))
+    after = None if not page.ui else partial(_page, page, opened, known, found, kinematics, arm.robot)
+    return Answer(data, lambda console: _show(console, data), after)
+
+
+def _page(
+    page: Page,
+    opened: Opened,
+    known: Measurements,
+    found: Hindsight,
+    kinematics: ArmKinematics | None,
+    description: str | None,
+) -> None:
+    shown = show_views(
+        page,
+        opened,
+        known,
+        found.final,
+        arm=None if kinematics is None else kinematics.arm,
+        description=description,
+        known=_curve(found.steps),
+        planned=_curve(found.planned),
+    )
+    serve(shown)
+
+
+def _curve(steps: tuple[After, ...]) -> Curve:
+    return tuple(
+        (number, step.within.translation_mm, step.within.rotation_deg)
+        for number, step in enumerate(steps, START)
+        if step.within is not None
+    )
 
 
 def _show(console: "Console", data: dict[str, Any]) -> None:

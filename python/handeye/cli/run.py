@@ -14,7 +14,7 @@ from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder
 from handeye.cli.page import Live, Page
 from handeye.cli.run_answer import judged_by, run_answer
-from handeye.cli.run_options import Lens, Limits, Simulated, Timeouts
+from handeye.cli.run_options import Lens, Limits, Simulated, TimeoutOptions
 from handeye.cli.work import WorkOptions, check_touch
 from handeye.datasets import read_camera, read_target
 from handeye.estimation import Estimate
@@ -58,6 +58,7 @@ def run(
     accuracy_deg: float = 0.05,
     touch_mm: float | None = None,
     max_views: int = 20,
+    anyway: bool = False,
     seed: Seed = 0,
     model: ModelName = ModelName.AUTO,
     policy: str = "next_best_view",
@@ -67,7 +68,7 @@ def run(
     confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen, like those below
     work: WorkOptions = WorkOptions(),  # noqa: B008
-    timeouts: Timeouts = Timeouts(),  # noqa: B008
+    timeouts: TimeoutOptions = TimeoutOptions(),  # noqa: B008
     unknown: Lens = Lens(),  # noqa: B008
     simulated: Simulated = Simulated(),  # noqa: B008
     page: Page = Page(),  # noqa: B008
@@ -107,6 +108,9 @@ def run(
         work, and choose views for it.
     max_views
         Stop at so many views in any case.
+    anyway
+        Go on where the accuracy is out of reach. Else a run ends where, from five views on, even 40 would not
+        come near it, and says what they would come to.
     seed
         Of every choice by chance, and of the simulated cell.
     model
@@ -162,13 +166,14 @@ def run(
             float(np.deg2rad(limits.tilt_deg)),
             limits.margin_px,
         ),
-        patience=timeouts.patience(driver, images),
+        timeouts=timeouts.timeouts(driver, images),
         camera_known=not (unknown.uncalibrated and driver == SIMULATED),
         lens=unknown.lens,
         accuracy_px=unknown.accuracy_px,
         simulation=simulated.simulation(),
         touch_mm=touch_mm,
         work=work.work(),
+        anyway=anyway,
     )
     if (driver == SIMULATED) != (images == SIMULATED):
         raise UsageError("--driver and --images are either both simulated or both not")

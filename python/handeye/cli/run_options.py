@@ -5,7 +5,7 @@ from typing import Literal
 
 from cyclopts import Parameter
 
-from handeye.session.attempt import Patience
+from handeye.session.attempt import Timeouts
 from handeye.session.drivers import MANUAL
 from handeye.session.faults import FaultRates
 from handeye.session.settings import Collisions, Simulation
@@ -37,7 +37,7 @@ class Limits:
 
 @Parameter(name="*", group="Time-outs")
 @dataclass(frozen=True)
-class Timeouts:
+class TimeoutOptions:
     """How long a real robot and camera may take; nothing new is sent before the last call is back."""
 
     move_timeout_s: float | None = None
@@ -47,11 +47,11 @@ class Timeouts:
     camera_timeout_s: float | None = None
     """For one picture: 10 s, ten minutes from a folder or where a person moves the arm."""
 
-    def patience(self, driver: str, images: str) -> Patience:
+    def timeouts(self, driver: str, images: str) -> Timeouts:
         """Return it as the library takes it."""
         by_hand = driver.partition(":")[0] == MANUAL
         # A person takes the time that a person takes.
-        usual = Patience(move_s=3600.0, read_s=600.0, grab_s=600.0) if by_hand else Patience()
+        usual = Timeouts(move_s=3600.0, read_s=600.0, grab_s=600.0) if by_hand else Timeouts()
         if images.partition(":")[0] == "folder":
             usual = replace(usual, grab_s=600.0)
         stated = {

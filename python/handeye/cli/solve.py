@@ -17,6 +17,7 @@ from handeye.cli.solve_rig import answer_for_rig
 from handeye.cli.source import Source, mindful_of
 from handeye.cli.work import WorkOptions, touch_lines
 from handeye.datasets import PosePairs
+from handeye.datasets.touches import read_touches
 from handeye.estimation import Measurements, make_estimator
 from handeye.estimation import solve as solve_recording
 from handeye.estimation.certificate import Certificate, certify_calibration
@@ -38,6 +39,7 @@ def solve(
     reduced: bool = False,
     camera_fixed: bool = False,
     certify: bool = False,
+    touches: Path | None = None,
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
@@ -65,13 +67,15 @@ def solve(
         Hold the camera as it is given. Else its parameters are found again within what is known of them.
     certify
         Bound from below how well any other answer could fit the poses, and say whether this is the best.
+    touches
+        Points that were touched, as measurements beside the pictures: the file of `handeye verify`.
     output
         Also write the JSON object to this file.
     """
     check_output(output)
     if source.only is None and is_rig(folder):
-        if certify or page.ui:
-            raise UsageError("--certify and --ui take one camera", hint="leave them out for several")
+        if touches is not None:
+            raise UsageError("--touches takes one camera", hint="leave it out for several")
         rig = source.open_rig(folder)
         views = [station.views[0].view for station in rig.recording.stations]
         return answer_for_rig(
@@ -81,6 +85,9 @@ def solve(
             reduced=reduced,
             kinematics=arm.kinematics(views, model),
             camera_fixed=camera_fixed,
+            certify=certify,
+            page=page,
+            arm=arm,
         )
     opened = source.open_any(folder, arm.described())
     if isinstance(opened, PosePairs):
@@ -94,6 +101,7 @@ def solve(
             kinematics=kinematics,
             camera_fixed=camera_fixed,
             work=work.work(),
+            probing=None if touches is None else read_touches(touches),
         )
     region = position_region(calibration)
     data = _data(opened, calibration, region)

@@ -1,13 +1,17 @@
 """The answer of `handeye solve` for several cameras."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
+from handeye.cli.arm import ArmSource
 from handeye.cli.output import write_json
+from handeye.cli.page import Page, serve, show_rig
 from handeye.cli.source import mindful_of
 from handeye.errors import InputError
 from handeye.estimation import RigCalibration, solve_rig
+from handeye.estimation.certificate import Certificate, certify_rig
 from handeye.estimation.confidence import Within
 from handeye.importing import OpenedRig
 from handeye.types.calibration import ModelName
@@ -25,8 +29,11 @@ def answer_for_rig(
     reduced: bool,
     kinematics: Kinematics | None,
     camera_fixed: bool,
+    certify: bool,
+    page: Page,
+    arm: ArmSource,
 ) -> Answer:
-    """Solve all cameras in one estimate.
+    """Solve all cameras in one estimate, and certify it where that is asked for.
 
     Raises
     ------
@@ -38,9 +45,17 @@ def answer_for_rig(
     with mindful_of(opened.warnings):
         rig = solve_rig(opened.recording, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed)
     data = rig_data(opened, rig)
+    certificate = certify_rig(rig) if certify else None
+    if certificate is not None:
+        data["certificate"] = certificate.to_dict()
     if output is not None:
         write_json(output, data)
-    return Answer(data, lambda console: _show(console, opened, rig, output))
+    after = None if not page.ui else partial(_page, page, opened, rig, arm)
+    return Answer(data, lambda console: _show(console, opened, rig, certificate, output), after)
+
+
+def _page(page: Page, opened: OpenedRig, rig: RigCalibration, arm: ArmSource) -> None:
+    serve(show_rig(page, opened, rig, arm=arm.described(), description=arm.robot))
 
 
 def rig_data(opened: OpenedRig, rig: RigCalibration) -> dict[str, Any]:
@@ -60,7 +75,13 @@ def rig_data(opened: OpenedRig, rig: RigCalibration) -> dict[str, Any]:
     }
 
 
-def _show(console: "Console", opened: OpenedRig, rig: RigCalibration, output: Path | None) -> None:
+def _show(
+    console: "Console",
+    opened: OpenedRig,
+    rig: RigCalibration,
+    certificate: Certificate | None,
+    output: Path | None,
+) -> None:
     from handeye.cli.wording import (  # noqa: PLC0415 - a program reading JSON need not wait for it
         MOUNTINGS,
         figures,
@@ -98,6 +119,8 @@ def _show(console: "Console", opened: OpenedRig, rig: RigCalibration, output: Pa
         heading(console, f"{name}: T_{rig.target_bodies[name].value}_target", "")
         pairs(console, [*pose_lines(relative.pose), ("accuracy", _stated(relative.within_95))], indent=2)
     console.print()
+    if certificate is not None:
+        pairs(console, [("certificate", certificate.sentence)])
     left_out = {
         f"{name}, {view.name}": view.reason
         for name, calibration in rig.cameras.items()

@@ -1,5 +1,6 @@
 """`handeye study`: the tables and figures of the paper, and those that go beyond it, on public data."""
 
+import importlib.metadata
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,14 @@ study = App(
 study.command(
     "handeye.cli.study_touch:touch", name="touch", help="Count how often the tool lands where it is said to."
 )
+study.command(
+    "handeye.cli.study_shift:shift", name="shift", help="Count how often a check finds and names what moved."
+)
+study.command(
+    "handeye.cli.study_probing:probing", name="probing", help="Count what finds a board of another size."
+)
+study.command("handeye.cli.study_arm:arm", name="arm", help="Compare arms put right with the truth.")
+study.command("handeye.cli.study_cheap_arms:cheap_arms", name="cheap-arms", help="Try arms of hobby servos.")
 study.command(
     "handeye.cli.study_twin:twin", name="twin", help="Repeat the paper's study on a twin of its cell."
 )
@@ -459,17 +468,26 @@ def mistakes(
     return Answer(document, show)
 
 
+def versions() -> dict[str, str]:
+    """Return the versions that the numbers of a study come from."""
+    names = ("handeye", "numpy", "opencv-contrib-python-headless")
+    return {name: importlib.metadata.version(name) for name in names}
+
+
 def write_results(
     folder: Path | None,
     name: str,
     document: Mapping[str, Any],
     pictures: "Callable[[], Iterable[tuple[str, Figure]]]",
 ) -> list[Path]:
-    """Write the numbers of a study and its pictures into a folder, if one is asked for; return the files."""
+    """Write the numbers of a study, with versions, and its pictures into a folder, if one is asked for.
+
+    Returns the files.
+    """
     if folder is None:
         return []
     written = [folder / f"{name}.json"]
-    write_json(written[0], document)
+    write_json(written[0], {**document, "versions": versions()})
     for picture, figure in pictures():
         written.append(folder / f"{picture}.png")
         write_figure(written[-1], figure)

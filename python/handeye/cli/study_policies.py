@@ -14,6 +14,7 @@ from handeye.cli.study import Trials, write_results
 from handeye.types.mounting import Mounting
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import Console
     from rich.table import Table
 
@@ -34,10 +35,12 @@ def policies(
 ) -> Answer:
     """Compare policies in the same simulated cells: the same start, budget and noise.
 
-    Ours one view after another and all at once, the paper's two baselines, the fixed moves of other tools, a
+    Ours as `handeye run` drives, one view after another from a pool and all at once, the paper's two
+    baselines from the pool and from the candidates of `handeye run`, the fixed moves of other tools, a
     lattice driven to and fro, and poses as people choose them. What each brings is solved alike, by the
-    default with the arm described. Beside each mean stands how many times the error of the first row it is
-    (geometric mean over the cells), and its 95 % interval.
+    default with the arm described, and measured several times with all noise drawn again. Beside each mean
+    stands how many times the error of the first row it is (geometric mean over the cells), and its 95 %
+    interval.
 
     Parameters
     ----------
@@ -59,7 +62,8 @@ def policies(
             progress=advance,
         )
     document = result.to_dict()
-    written = write_results(trials.output, f"policies_{arm.value}", document, lambda: ())
+    name = f"policies_{arm.value}"
+    written = write_results(trials.output, name, document, lambda: _policies_picture(name, document))
     return Answer(document, lambda console: _show_policies(console, document, written))
 
 
@@ -106,6 +110,12 @@ def gains(
     document = result.to_dict()
     written = write_results(trials.output, f"gains_{mounting.value}_{arm.value}", document, lambda: ())
     return Answer(document, lambda console: _show_gains(console, document, written))
+
+
+def _policies_picture(name: str, document: dict[str, Any]) -> "list[tuple[str, Figure]]":
+    from handeye.studies.policies_picture import draw_policies  # noqa: PLC0415 - only where one is asked for
+
+    return [(name, draw_policies(document))]
 
 
 def _show_policies(console: "Console", document: dict[str, Any], written: list[Path]) -> None:

@@ -1,6 +1,5 @@
 """`handeye study public`: cells and data that others made, against what others use."""
 
-import importlib.metadata
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
@@ -12,14 +11,11 @@ from handeye.cli.answer import Answer
 from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import Data, Trials, write_results
+from handeye.cli.study import Data, Trials, versions, write_results
 from handeye.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-
-PACKAGES = ("handeye", "numpy", "opencv-contrib-python-headless")
 
 
 class PublicPart(StrEnum):
@@ -69,10 +65,7 @@ def public(
     document: dict[str, Any] = {
         "study": "public",
         "seed": trials.seed,
-        "versions": {
-            name: importlib.metadata.version(name)
-            for name in ("handeye", "numpy", "opencv-contrib-python-headless")
-        },
+        "versions": versions(),
         "parts": {part.value: _part(part, kinhec, tracks, most, folder, data, trials) for part in parts},
     }
     written = write_results(trials.output, "public", document, lambda: ())

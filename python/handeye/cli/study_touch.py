@@ -81,7 +81,7 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
     table.add_column("cells")
     planned = document["asked_mm"] is not None
     names = ["within", "error mm", "stated mm"]
-    names += ["by entropy mm", "by touch mm", "reached", "kept"] if planned else []
+    names += ["by entropy mm", "by touch mm", "all 40 mm", "reached", "kept"] if planned else []
     for name in names:
         table.add_column(name, justify="right")
     for name, group in document["groups"].items():
@@ -89,6 +89,7 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
         row += [figures(group["error_mm"]), figures(group["radius_mm"])]
         if planned:
             row += [figures(group["planned_by_entropy_mm"]), figures(group["planned_by_touch_mm"])]
+            row += [figures(group["whole_pool_mm"])]
             row += [f"{group['asked_met']} of {document['cells']}", f"{group['asked_held']:.1%}"]
         table.add_row(*row)
     console.print(table)

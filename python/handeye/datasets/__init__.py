@@ -14,8 +14,9 @@ from handeye.datasets.pose_files import PoseTable, read_pose_rows, read_poses
 from handeye.datasets.pose_pairs import PosePair, PosePairs
 from handeye.datasets.pose_rows import PoseRows, Reading, Statement
 from handeye.datasets.read_back import check_written, check_written_rig
-from handeye.datasets.recording_format import LoadedRecording, read_recording, write_recording
+from handeye.datasets.recording_format import LoadedRecording, read_recording
 from handeye.datasets.recording_header import holds_several
+from handeye.datasets.recording_writing import write_recording
 from handeye.datasets.rig_format import LoadedRig, read_rig, rig_warnings, write_rig
 
 __all__ = [

@@ -71,6 +71,25 @@ class Shot:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class WrittenPoses:
+    """How the poses of a set are written, as it was stated.
+
+    Attributes
+    ----------
+    rows
+        One for each picture.
+    reading
+        What the rows are said to mean.
+    file
+        The file, as the caller would name it.
+    """
+
+    rows: PoseRows
+    reading: Reading
+    file: str
+
+
 @dataclass(frozen=True)
 class ImageSet:
     """Images with robot poses, and what the files say about target and camera.
@@ -101,6 +120,8 @@ class ImageSet:
         Values that are possible but hardly meant, and choices that the files left open.
     pictures
         What gives the grey values (H, W) of a shot that has no file of its own, by its name.
+    written
+        How the poses are written, where that was stated; None for formats that leave no choice.
     """
 
     name: str
@@ -117,6 +138,7 @@ class ImageSet:
     pictures: Mapping[str, Callable[[], NDArray[np.uint8]]] = field(
         default_factory=dict[str, Callable[[], NDArray[np.uint8]]]
     )
+    written: WrittenPoses | None = None
 
     def grey(self, shot: Shot) -> NDArray[np.uint8]:
         """Return the grey values (H, W) of a shot.

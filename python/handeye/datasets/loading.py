@@ -20,7 +20,7 @@ from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Imported, Importer
 from handeye.datasets.joint_states import Forward
 from handeye.datasets.pose_rows import NOTHING_STATED, Statement
-from handeye.datasets.reading import existing_folder, is_file
+from handeye.datasets.reading import existing_folder, file_names, is_file
 from handeye.datasets.recording_format import LoadedRecording
 from handeye.datasets.recording_header import FILE_NAME
 from handeye.errors import InputError
@@ -134,6 +134,15 @@ def _place(path: str | os.PathLike[str]) -> Path:
         raise InputError(f"{path!r}: not a path ({error})", code="unreadable") from error
 
 
+def _holds_parquet(folder: Path) -> bool:
+    """Tell whether a folder has tables of Parquet, in it or as LeRobot lays them out."""
+    try:
+        named = any(name.lower().endswith(".parquet") for name in file_names(folder))
+    except InputError:
+        return False
+    return named or (is_file(folder / "meta" / "info.json") and (folder / "data").is_dir())
+
+
 def _not_recognised(folder: Path) -> InputError:
     kinds = "; ".join([f"a folder with {FILE_NAME}", *(i.looks_like for i in IMPORTERS.values())])
     below: list[str] = []
@@ -148,6 +157,10 @@ def _not_recognised(folder: Path) -> InputError:
     hint = (
         f"below it there are {', '.join(sorted(below)[:_MAX_LISTED])}: give one of these" if below else None
     )
+    if hint is None and _holds_parquet(folder):
+        hint = (
+            "Parquet is not read: write its poses as CSV (pandas: to_csv) and its pictures as files beside it"
+        )
     return InputError(
         f"{folder}: nothing that can be read, expected {kinds}", code="unknown_format", hint=hint
     )

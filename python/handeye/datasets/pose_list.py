@@ -22,7 +22,14 @@ import numpy as np
 
 from handeye.datasets.camera_files import read_camera
 from handeye.datasets.image_header import IMAGE_SUFFIXES
-from handeye.datasets.image_set import ImageSet, ImportOptions, Shot, UnreadPoses, common_image_size
+from handeye.datasets.image_set import (
+    ImageSet,
+    ImportOptions,
+    Shot,
+    UnreadPoses,
+    WrittenPoses,
+    common_image_size,
+)
 from handeye.datasets.importer import Importer
 from handeye.datasets.joint_states import read_joint_rows
 from handeye.datasets.parameter_files import read_target
@@ -92,7 +99,8 @@ def read(folder: Path, options: ImportOptions) -> ImageSet | UnreadPoses:
     )
     if known:
         named = zip((shot.name for shot in shots), poses, strict=True)
-        return replace(images, warnings=(*images.warnings, *pose_warnings(named)))
+        written = None if rows.joints is not None else WrittenPoses(rows, readings[0], file)
+        return replace(images, warnings=(*images.warnings, *pose_warnings(named)), written=written)
     return UnreadPoses(images, rows, readings, file)
 
 

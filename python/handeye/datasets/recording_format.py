@@ -16,22 +16,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from handeye.datasets.corners import corners_text, read_corners
+from handeye.datasets.corners import read_corners
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning, recording_warnings
-from handeye.datasets.reading import existing_folder, inside, is_file, located, read_text
-from handeye.datasets.recording_header import FILE_NAME, FORMAT, MAX_BYTES, VERSION, read_versioned
-from handeye.datasets.toml_text import toml_text
-from handeye.datasets.writing import copy_file, is_occupied, new_folder, replace_file, write_file
-from handeye.errors import HandeyeError, InputError, OutputError
+from handeye.datasets.reading import existing_folder, inside, located
+from handeye.datasets.recording_header import FILE_NAME, VERSION, read_versioned
+from handeye.errors import InputError
 from handeye.types import Camera, Mounting, Pose, Recording, Target, Truth, View
-from handeye.types.plain import Document, read_document, without_none
+from handeye.types.plain import Document, read_document
 from handeye.types.view import check_view_name
 
 Rows = list[list[float]]
 
 
-class _ViewDocument(Document):
+class ViewDocument(Document):
+    """The table of a view."""
+
     name: str
     T_base_flange: Rows
     corners: str
@@ -40,7 +40,9 @@ class _ViewDocument(Document):
     joints_rad: list[float] | None = None
 
 
-class _RecordingDocument(Document):
+class RecordingDocument(Document):
+    """All of `recording.toml`."""
+
     format: str
     version: int
     name: str
@@ -50,7 +52,7 @@ class _RecordingDocument(Document):
     source: str = ""
     truth: dict[str, Rows] | None = None
     view_count: int | None = None
-    view: list[_ViewDocument] = []  # noqa: RUF012 - msgspec copies an empty default
+    view: list[ViewDocument] = []  # noqa: RUF012 - msgspec copies an empty default
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ def read_recording(folder: str | os.PathLike[str]) -> LoadedRecording:
     """
     root = existing_folder(folder)
     file = root / FILE_NAME
-    document = _read_document(file)
+    document = read_recording_document(file)
     with located(str(file)):
         if document.view_count not in {None, len(document.view)}:
             raise InputError(
@@ -133,7 +135,7 @@ def read_views_apart(folder: str | os.PathLike[str]) -> ViewsApart:
     """
     root = existing_folder(folder)
     file = root / FILE_NAME
-    document = _read_document(file)
+    document = read_recording_document(file)
     views: dict[str, View | InputError] = {}
     with located(str(file)):
         camera = Camera.from_dict(document.camera)
@@ -147,64 +149,14 @@ def read_views_apart(folder: str | os.PathLike[str]) -> ViewsApart:
     return ViewsApart(recording, views)
 
 
-def write_empty_recording(recording: Recording, folder: Path) -> None:
-    """Write `recording.toml` alone, without views, into a folder that has lost its own.
+def read_recording_document(file: Path) -> RecordingDocument:
+    """Read `recording.toml` alone.
 
     Raises
     ------
-    OutputError
-        The system refuses to write.
+    InputError
+        It cannot be read, or is one of several cameras or targets.
     """
-    replace_file(folder / FILE_NAME, _text(recording.with_views(()), []))
-
-
-def write_recording(
-    recording: Recording,
-    folder: str | os.PathLike[str],
-    *,
-    images_from: str | os.PathLike[str] | None = None,
-    replace: bool = False,
-) -> None:
-    """Write a recording; a reader finds all of it or, after an error, what was there before.
-
-    Parameters
-    ----------
-    recording
-        What to write.
-    folder
-        A folder that does not exist yet or is empty; its parent exists.
-    images_from
-        The folder that the images of the views are relative to; they are copied to `images/`. With None no
-        image is copied, and views keep only an image that lies in `folder` already.
-    replace
-        Update a recording that is there already. Images are never removed.
-
-    Raises
-    ------
-    OutputError
-        The folder is not empty (without `replace`) or holds no recording (with it), an image is missing, or
-        the system refuses to write: no space, no permission, read-only.
-
-    Examples
-    --------
-    >>> import pathlib, handeye
-    >>> from handeye.datasets.shipped import shipped_recording
-    >>> write_recording(handeye.read_recording(shipped_recording()).recording, pathlib.Path("copy"))
-    >>> handeye.read_recording("copy").recording.name
-    'CS_synthetic_3'
-    """
-    target = Path(folder)
-    source = None if images_from is None else Path(images_from)
-    if replace and _occupied(target):
-        _update(recording, target, source)
-        return
-    with new_folder(target) as partial:
-        (partial / "corners").mkdir()
-        tables = [_write_view(view, partial, source) for view in recording.views]
-        write_file(partial / FILE_NAME, _text(recording, tables))
-
-
-def _read_document(file: Path) -> _RecordingDocument:
     data = read_versioned(file)
     if data["version"] != VERSION:
         raise InputError(
@@ -212,10 +164,10 @@ def _read_document(file: Path) -> _RecordingDocument:
             code="several_cameras",
             hint="handeye solve takes them together",
         )
-    return read_document(data, _RecordingDocument, str(file))
+    return read_document(data, RecordingDocument, str(file))
 
 
-def _read_view(document: _ViewDocument, root: Path, camera: Camera) -> View:
+def _read_view(document: ViewDocument, root: Path, camera: Camera) -> View:
     where = f"view {check_view_name(document.name)}"
     with located(f"{where}: T_base_flange"):
         T_base_flange = Pose(document.T_base_flange)
@@ -252,143 +204,3 @@ def _read_truth(table: dict[str, Rows], mounting: Mounting) -> Truth:
         with located(f"truth: {name}"):
             poses.append(Pose(table[name]) if name in table else None)
     return Truth(*poses)
-
-
-def _occupied(folder: Path) -> bool:
-    try:
-        return is_occupied(folder)
-    except (OSError, ValueError) as error:
-        raise OutputError(f"{folder}: cannot be written ({error})") from error
-
-
-def _text(recording: Recording, tables: list[dict[str, Any]]) -> bytes:
-    mounting, truth = recording.mounting, recording.truth
-    poses = {} if truth is None else {mounting.x_name: truth.X, mounting.y_name: truth.Y}
-    document = without_none(
-        format=FORMAT,
-        version=VERSION,
-        name=recording.name,
-        source=recording.source,
-        mounting=mounting.value,
-        view_count=len(tables),
-        camera=recording.camera.to_dict(),
-        target=recording.target.to_dict(),
-        truth={name: pose.to_list() for name, pose in poses.items() if pose is not None} or None,
-        view=tables,
-    )
-    return toml_text(document).encode()
-
-
-def _write_view(view: View, folder: Path, images_from: Path | None) -> dict[str, Any]:
-    """Write the files of a view under names that are free; return its table."""
-    corners = _free_name(folder, "corners", view.name, ".csv")
-    write_file(folder / corners, corners_text(view).encode())
-    return _view_table(view, corners, keep_image(view, folder, images_from, view.name))
-
-
-def _view_table(view: View, corners: str, image: str | None) -> dict[str, Any]:
-    return without_none(
-        name=view.name,
-        image=image,
-        corners=corners,
-        timestamp_s=view.timestamp_s,
-        joints_rad=None if view.joints_rad is None else list(view.joints_rad),
-        T_base_flange=view.T_base_flange.to_list(),
-    )
-
-
-def keep_image(view: View, folder: Path, images_from: Path | None, stem: str) -> str | None:
-    """Return the path of the image in the folder, copied there if need be; None if there is none."""
-    if view.image is None:
-        return None
-    if images_from is None:
-        return view.image if is_file(folder / view.image) else None
-    try:
-        source = inside(images_from, view.image, f"view {view.name}: image")
-        if source.is_relative_to(folder.resolve()):
-            return view.image
-    except (InputError, OSError) as error:
-        raise OutputError(f"{folder}: {error}", code="missing_file") from error
-    name = _free_name(folder, "images", stem, source.suffix.lower())
-    try:
-        (folder / "images").mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be written ({error})") from error
-    copy_file(source, folder / name)
-    return name
-
-
-def _free_name(folder: Path, below: str, name: str, suffix: str) -> str:
-    """Return `below/name.suffix`, or with a number if that is taken."""
-    candidate, number = f"{below}/{name}{suffix}", 1
-    while (folder / candidate).exists() or (folder / candidate).is_symlink():
-        number += 1
-        candidate = f"{below}/{name}.{number}{suffix}"
-    return candidate
-
-
-def _update(recording: Recording, folder: Path, images_from: Path | None) -> None:
-    """Replace a recording: what is new goes beside the old, then `recording.toml` in one step.
-
-    A file that the old `recording.toml` names is never written to, so the old recording stays whole until
-    the step.
-    """
-    try:
-        old = {view.name: view for view in _read_document(folder / FILE_NAME).view}
-    except InputError as error:
-        raise OutputError(
-            f"{folder}: not replaced, as it holds no recording that can be read: {error}", code="exists"
-        ) from error
-    written: list[Path] = []
-    text = b""
-    try:
-        (folder / "corners").mkdir(exist_ok=True)
-        tables = [
-            _updated_view(view, old.get(view.name), folder, images_from, written) for view in recording.views
-        ]
-        text = _text(recording, tables)
-        replace_file(folder / FILE_NAME, text)
-    except BaseException as error:
-        if not _is_current(folder, text):
-            for path in written:
-                path.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise OutputError(f"{folder}: cannot be written ({error})") from error
-        raise
-    kept = {table["corners"] for table in tables}
-    for view in old.values():
-        if view.corners not in kept:
-            _remove_corners(folder, view.corners)
-
-
-def _is_current(folder: Path, text: bytes) -> bool:
-    """Tell whether the step is done: an interruption may come right after it."""
-    try:
-        return read_text(folder / FILE_NAME, MAX_BYTES).encode() == text
-    except InputError:
-        return True  # in doubt, what lies around does no harm
-
-
-def _updated_view(
-    view: View, old: _ViewDocument | None, folder: Path, images_from: Path | None, written: list[Path]
-) -> dict[str, Any]:
-    if old is not None and _holds(folder, old.corners, corners_text(view)):
-        return _view_table(view, old.corners, keep_image(view, folder, images_from, view.name))
-    table = _write_view(view, folder, images_from)
-    written.append(folder / table["corners"])
-    return table
-
-
-def _holds(folder: Path, corners: str, text: str) -> bool:
-    try:
-        return read_text(inside(folder, corners, "corners"), MAX_BYTES) == text
-    except InputError:
-        return False
-
-
-def _remove_corners(folder: Path, corners: str) -> None:
-    """Remove a file that no view names any more; if that fails, it only takes up room."""
-    try:
-        inside(folder, corners, "corners").unlink()
-    except (HandeyeError, OSError):
-        return

@@ -23,8 +23,9 @@ from handeye.datasets.corners import corners_text, read_corners
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning, recording_warnings
 from handeye.datasets.reading import existing_folder, inside, located
-from handeye.datasets.recording_format import Rows, keep_image, write_recording
+from handeye.datasets.recording_format import Rows
 from handeye.datasets.recording_header import FILE_NAME, FORMAT, RIG_VERSION, read_versioned
+from handeye.datasets.recording_writing import keep_image, write_recording
 from handeye.datasets.toml_text import toml_text
 from handeye.datasets.writing import new_folder, replace_file, write_file
 from handeye.errors import InputError, OutputError

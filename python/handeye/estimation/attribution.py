@@ -30,6 +30,7 @@ _SIDES = {
     "posture_flange": RobotSide.FLANGE,
     "posture_base": RobotSide.BASE,
     "joint_noise": RobotSide.JOINTS,
+    "backlash": RobotSide.JOINTS,
     "joint_offsets": RobotSide.JOINTS,
     "links": RobotSide.LINKS,
 }
@@ -196,6 +197,10 @@ def _robot_words(
         degrees = np.rad2deg(levels["joint_rad"])
         words = f"noise of the joints explains the misfit best: each is off by about {degrees:.2g} deg"
         return "robot_joint_noise", f"{words}, another way at each view"
+    if name == "backlash":
+        degrees = np.rad2deg(levels["play_rad"])
+        words = f"play of the joints explains the misfit best: about {degrees:.2g} deg"
+        return "robot_play", f"{words}, by the side that each came from"
     if name == "joint_offsets":
         return "robot_joint_offsets", _offset_words(posterior, arm)
     if name == "links":

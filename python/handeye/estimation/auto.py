@@ -20,6 +20,7 @@ from handeye.estimation.rig_measurements import RigMeasurements
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Finding, ModelName, Noise, Unobservable
 from handeye.types.kinematics import Kinematics
+from handeye.types.probing import Probing
 from handeye.types.rig import CAMERA, TARGET
 
 
@@ -33,10 +34,16 @@ class AutoOptions:
         The arm, if it is known; every view must then have joint positions.
     camera_fixed
         Whether the camera is held as it is given.
+    probing
+        Points that were touched.
+    play
+        Whether the joints have play, and came to every view straight from the one before.
     """
 
     kinematics: Kinematics | None = None
     camera_fixed: bool = False
+    probing: Probing | None = None
+    play: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,8 @@ class AutoEstimator:
             self.options.kinematics,
             camera_fixed=self.options.camera_fixed,
             start=None if previous is None else (previous.X.matrix[None], previous.Y.matrix[None]),
+            probing=self.options.probing,
+            play=self.options.play,
         )
         used = fit.measurements.pairs[CAMERA, TARGET]
         noise = noise_of(fit.posterior, fit.measurements.whole, fit.arm, fit.pixels[CAMERA, TARGET].sigma_px)
@@ -135,6 +144,7 @@ def estimate_of(
         link_errors=() if arm is None or correction is None else arm.link_errors(correction.displacements),
         arm_correction=correction,
         attribution=of_misfit,
+        tips=fit.tips,
     )
 
 

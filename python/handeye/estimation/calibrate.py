@@ -7,7 +7,7 @@ import numpy as np
 from handeye.errors import DegenerateError
 from handeye.estimation.auto import AutoEstimator, AutoOptions
 from handeye.estimation.estimate import Estimate, Estimator, regular_information
-from handeye.estimation.faults import Examination, examine
+from handeye.estimation.faults import Examination, examine, measured
 from handeye.estimation.initialize import check_views
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.paper import paper_estimate
@@ -16,6 +16,7 @@ from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName, ViewResult
 from handeye.types.kinematics import Kinematics
 from handeye.types.mounting import Mounting
+from handeye.types.probing import Probing
 from handeye.types.recording import Recording
 
 WHAT_NO_VIEW_SHOWS = (
@@ -26,12 +27,16 @@ WHAT_NO_VIEW_SHOWS = (
 
 
 def make_estimator(
-    model: ModelName, kinematics: Kinematics | None = None, *, camera_fixed: bool = False
+    model: ModelName,
+    kinematics: Kinematics | None = None,
+    *,
+    camera_fixed: bool = False,
+    probing: Probing | None = None,
 ) -> Estimator:
-    """Return what estimates under a model's assumptions; the paper's model has no use for the arm."""
+    """Return what estimates under a model's assumptions; the paper's has no use for arm or touches."""
     if ModelName(model) is ModelName.PAPER:
         return paper_estimate
-    return AutoEstimator(AutoOptions(kinematics=kinematics, camera_fixed=camera_fixed))
+    return AutoEstimator(AutoOptions(kinematics, camera_fixed, probing))
 
 
 def solve(
@@ -42,6 +47,7 @@ def solve(
     kinematics: Kinematics | None = None,
     camera_fixed: bool = False,
     work: Work | None = None,
+    probing: Probing | None = None,
 ) -> Calibration:
     """Calibrate from all usable views of a recording.
 
@@ -64,6 +70,8 @@ def solve(
     work
         What is seen and touched, for the touch error; None for none. `Work()` is a usual tool where the board
         was seen.
+    probing
+        Points that were touched, as measurements beside the pictures.
 
     Raises
     ------
@@ -85,14 +93,14 @@ def solve(
     >>> 1e3 * calibration.sigma_translation_m < 0.1  # mm
     True
     """
-    measurements = Measurements.of_recording(recording)
     return calibrate(
-        measurements,
+        measured(recording),
         ModelName(model),
         reduced=reduced,
         kinematics=kinematics,
         camera_fixed=camera_fixed,
         work=work,
+        probing=probing,
     )
 
 
@@ -104,6 +112,7 @@ def calibrate(
     kinematics: Kinematics | None = None,
     camera_fixed: bool = False,
     work: Work | None = None,
+    probing: Probing | None = None,
 ) -> Calibration:
     """Calibrate from measurements; see `solve`."""
     check_views(measurements)
@@ -114,6 +123,7 @@ def calibrate(
         kinematics=kinematics,
         camera_fixed=camera_fixed,
         work=work,
+        probing=probing,
     )
 
 
@@ -125,11 +135,12 @@ def calibrate_examined(
     kinematics: Kinematics | None = None,
     camera_fixed: bool = False,
     work: Work | None = None,
+    probing: Probing | None = None,
 ) -> Calibration:
     """Calibrate from measurements whose mistakes have been looked for; see `solve`."""
     measurements = examination.measurements
     check_views(measurements)
-    estimate = make_estimator(model, kinematics, camera_fixed=camera_fixed)(measurements)
+    estimate = make_estimator(model, kinematics, camera_fixed=camera_fixed, probing=probing)(measurements)
     if not reduced:
         require_determined(estimate)
     calibration = examination.told(to_calibration(measurements, estimate))

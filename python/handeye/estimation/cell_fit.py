@@ -5,7 +5,7 @@ One camera and one target are the simple case, and go the same way.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -13,11 +13,13 @@ from handeye import _core
 from handeye.estimation.arm import ArmModel, velocities
 from handeye.estimation.camera_prior import CameraPrior, camera_prior
 from handeye.estimation.measurements import Measurements, ViewPose
+from handeye.estimation.probing import ProbingRows, probing_rows
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
 from handeye.types.arrays import FloatArray
 from handeye.types.camera import Camera
 from handeye.types.kinematics import Kinematics
 from handeye.types.pose import Pose
+from handeye.types.probing import Probing, Tip
 from handeye.types.rig import Body
 
 # No view's pixel noise is believed to be less. Even on rendered pictures corners err by a hundredth of a
@@ -33,6 +35,10 @@ MIRROR_RATIO = 8.0
 # Beyond this, in pixels anywhere in the image, what was measured through the camera is measured again.
 LARGEST_CAMERA_SHIFT_PX = 2.0
 MOST_CAMERAS = 4
+# Noise of a rotation or joint that arms in good order do not have, and about what they have at most.
+ROUGH_RAD, USUAL_NOISE_RAD = float(np.deg2rad(0.15)), float(np.deg2rad(0.03))
+# Where the arm is not described part of what hides shows as noise; by `handeye study cheap-arms`.
+NOT_DESCRIBED_POWER = 0.5
 # Components of the error whose constants belong to the arm.
 OF_ARM = frozenset({"joint_offsets", "links"})
 
@@ -63,6 +69,8 @@ class CellFit:
         The arm, if it is known.
     posterior
         Of all parameters.
+    probing
+        Points that were touched; None without any.
     """
 
     measurements: RigMeasurements
@@ -70,6 +78,7 @@ class CellFit:
     pixels: Mapping[Pair, PixelNoise]
     arm: ArmModel | None
     posterior: _core.Posterior
+    probing: Probing | None = None
 
     @cached_property
     def X(self) -> dict[str, Pose]:
@@ -122,6 +131,21 @@ class CellFit:
         return poses + free + list(self.measurements.targets).index(target)
 
     @cached_property
+    def tips(self) -> dict[str, Tip]:
+        """Tips of the touches where they were found, with the largest of their deviations per axis."""
+        if self.probing is None:
+            return {}
+        first = self.row_of_board(next(iter(self.measurements.targets))) + len(self.measurements.targets)
+        covariance = np.asarray(self.posterior.covariance)
+        found: dict[str, Tip] = {}
+        for i, (name, tip) in enumerate(self.probing.tips.items()):
+            rows = slice(first + 3 * i, first + 3 * i + 3)
+            x, y, z = (np.array(tip.at_m) + self.theta[rows]).tolist()
+            largest = float(np.linalg.eigvalsh(covariance[rows, rows])[-1])
+            found[name] = Tip(tip.body, (x, y, z), max(largest, 0.0) ** 0.5)
+        return found
+
+    @cached_property
     def rows_of_arm(self) -> list[int]:
         """Where the constants of the arm stand."""
         return [i for name, a, b in self.posterior.constants if name in OF_ARM for i in range(a, b)]
@@ -133,6 +157,8 @@ def fit_cell(
     *,
     camera_fixed: bool = False,
     start: Start | None = None,
+    probing: Probing | None = None,
+    play: bool = False,
 ) -> CellFit:
     """Fit everything in a cell to its measurements.
 
@@ -146,11 +172,16 @@ def fit_cell(
         Whether the cameras are held as they are given.
     start
         X (C, 4, 4) and Y (T, 4, 4) to try among other starts.
+    probing
+        Points that were touched, of the first target.
+    play
+        Whether the joints of a known arm have play, and came to every station straight from the one before.
 
     Raises
     ------
     InputError
-        Views without the joint positions that the arm needs, or a camera that nothing ties to the arm.
+        Views or touches without the joint positions that the arm needs, touches of points that the board does
+        not have, or a camera that nothing ties to the arm.
     """
     priors = {
         name: camera_prior(one.camera, fixed=camera_fixed) for name, one in measurements.cameras.items()
@@ -163,7 +194,9 @@ def fit_cell(
     if changed:
         measurements = measurements.through(changed)
     arm = None if kinematics is None else ArmModel.of(kinematics)
-    fit = _once(measurements, priors, arm, start)
+    touched = None if probing is None else probing_rows(measurements, probing, arm)
+    once = partial(_once, arm=arm, touched=touched, play=play)
+    fit = once(measurements, priors, start=start)
     for _ in range(MOST_CAMERAS):
         moved = {
             name: camera
@@ -176,13 +209,32 @@ def fit_cell(
         priors = {
             name: prior.moved(moved[name]) if name in moved else prior for name, prior in priors.items()
         }
-        fit = _once(measurements, priors, arm, _start(fit))
+        fit = once(measurements, priors, start=_start(fit))
     unmirrored = {
         (camera, target): put_right
         for (camera, target), measured in measurements.pairs.items()
         if (put_right := prefer_consistent_poses(measured, fit.X[camera], fit.Y[target])) is not None
     }
-    return fit if not unmirrored else _once(measurements.with_pairs(unmirrored), priors, arm, _start(fit))
+    if unmirrored:
+        measurements = measurements.with_pairs(unmirrored)
+        fit = once(measurements, priors, start=_start(fit))
+    rough = roughness(fit.posterior, described=arm is not None)
+    return fit if rough == 1.0 else once(measurements, priors, start=_start(fit), rough=rough)
+
+
+def roughness(posterior: _core.Posterior, *, described: bool) -> float:
+    """How many times rougher an arm is than those that priors are about, by what its noise shows; else one.
+
+    Servos that miss by a degree have zeros and links that are off as much: what hides in X and Y is believed
+    to be as large as what shows.
+    """
+    levels = dict(zip(posterior.level_names, posterior.levels[0], strict=True))
+    noise = float(
+        np.hypot.reduce([levels.get(name, 0.0) for name in ("flange_rad", "base_rad", "joint_rad")])
+    )
+    if noise <= ROUGH_RAD:
+        return 1.0
+    return (noise / USUAL_NOISE_RAD) ** (1.0 if described else NOT_DESCRIBED_POWER)
 
 
 def _start(fit: CellFit) -> Start:
@@ -192,8 +244,12 @@ def _start(fit: CellFit) -> Start:
 def _once(
     measurements: RigMeasurements,
     priors: Mapping[str, CameraPrior],
+    *,
     arm: ArmModel | None,
     start: Start | None,
+    touched: ProbingRows | None,
+    play: bool,
+    rough: float = 1.0,
 ) -> CellFit:
     whole = measurements.whole
     if arm is not None:
@@ -222,9 +278,14 @@ def _once(
         at = [place[view.name] for view in measured.views]
         widened = [shared * variance for variance in variances]
         seen.append((camera_of[camera], target_of[target], poses, at, widened))
-    of_arm = None
+    of_arm = approach = None
     if arm is not None:
-        by_joint, by_link = arm.at_flange(whole.joints)
+        joints = whole.joints if touched is None else np.concatenate([whole.joints, touched.joints])
+        by_joint, by_link = arm.at_flange(joints)
+        if play:
+            # Behind by half the play; of the first station nobody knows.
+            moved = np.sign(np.diff(joints, axis=0, prepend=joints[:1]))
+            approach = -0.5 * by_joint * moved[:, np.newaxis, :]
         of_arm = (by_joint, by_link, arm.scales.tolist(), list(arm.free), list(arm.lengths))
     cameras = [
         (
@@ -235,19 +296,29 @@ def _once(
         )
         for name, prior in priors.items()
     ]
+    stations = np.array([view.T_base_flange.matrix for view in measurements.stations])
+    moving = velocities(whole)
+    if touched is not None:
+        stations = np.concatenate([stations, touched.poses])
+        # A tip that touches stands still.
+        moving = None if moving is None else np.concatenate([moving, np.zeros((len(touched.poses), 6))])
     posterior = _core.estimate_cell(
-        np.array([view.T_base_flange.matrix for view in measurements.stations]),
+        stations,
         cameras,
         [one.body is Body.FLANGE for one in measurements.targets.values()],
         seen,
-        velocities=velocities(whole),
+        velocities=moving,
         arm=of_arm,
+        approach=approach,
+        roughness=rough,
         board_scale=True,
         start=start,
+        tips=[] if touched is None else touched.tips,
+        touches=[] if touched is None else touched.touches,
         pairs=NODE_PAIRS,
         most_rounds=MOST_LINEARISATIONS,
     )
-    return CellFit(measurements, priors, pixels, arm, posterior)
+    return CellFit(measurements, priors, pixels, arm, posterior, None if touched is None else touched.probing)
 
 
 def _largest_shift_px(before: Camera, after: Camera) -> float:

@@ -23,6 +23,7 @@ import numpy as np
 
 from handeye.errors import DegenerateError, InputError
 from handeye.estimation.measurements import Measurements
+from handeye.estimation.rig import RigCalibration
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import MM_PER_M, Calibration
 from handeye.types.pose import inverses
@@ -178,6 +179,28 @@ def certify_calibration(recording: Recording, calibration: Calibration) -> Certi
     measured = Measurements.of(recording.mounting, calibration.camera, recording.target, views)
     problem = PoseProblem(measured.motions, measured.camera_poses)
     return certify(problem, calibration.X.matrix, calibration.Y.matrix)
+
+
+def certify_rig(rig: RigCalibration) -> Certificate:
+    """Certify the answer for several cameras and targets at once, on the poses of the targets found.
+
+    Raises
+    ------
+    InputError, DegenerateError
+        As `certify`.
+    """
+    fit = rig.estimate.fit
+    cameras, targets = list(fit.measurements.cameras), list(fit.measurements.targets)
+    pairs = fit.measurements.pairs
+    of = [(cameras.index(c), targets.index(t)) for (c, t), seen in pairs.items() for _ in range(len(seen))]
+    problem = PoseProblem(
+        np.concatenate([seen.motions for seen in pairs.values()]),
+        np.concatenate([seen.camera_poses for seen in pairs.values()]),
+        tuple(camera for camera, _ in of),
+        tuple(target for _, target in of),
+    )
+    X, Y = ([poses[name].matrix for name in names] for poses, names in ((fit.X, cameras), (fit.Y, targets)))
+    return certify(problem, np.array(X), np.array(Y))
 
 
 def _indices(problem: PoseProblem) -> tuple[Sequence[int], Sequence[int]]:

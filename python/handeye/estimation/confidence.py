@@ -83,10 +83,14 @@ def radii(
     means: FloatArray | None = None,
 ) -> FloatArray:
     """(Q,) radii within which vectors of covariances (Q, n, n) lie, about zero or means (Q, n)."""
-    draws = _drawn(covariances.shape[-1], degrees_of_freedom)
     variances, axes = np.linalg.eigh(covariances)
-    deviations = np.sqrt(np.clip(variances, 0, None))
-    centres = np.zeros_like(deviations) if means is None else np.einsum("qji,qj->qi", axes, means)
+    variances = np.clip(variances, 0, None)
+    if means is None:
+        squares = _squares(covariances.shape[-1], degrees_of_freedom)
+        return np.sqrt(np.quantile(squares @ variances.T, probability, axis=0))
+    draws = _drawn(covariances.shape[-1], degrees_of_freedom)
+    deviations = np.sqrt(variances)
+    centres = np.einsum("qji,qj->qi", axes, means)
     return np.array(
         [
             np.sqrt(np.quantile(np.square(draws * deviation + centre).sum(axis=1), probability))
@@ -104,6 +108,14 @@ def _drawn(size: int, degrees_of_freedom: float) -> FloatArray:
         draws /= np.sqrt(random.chisquare(degrees_of_freedom, _DRAWS) / degrees_of_freedom)[:, np.newaxis]
     draws.setflags(write=False)
     return draws
+
+
+@lru_cache(maxsize=8)
+def _squares(size: int, degrees_of_freedom: float) -> FloatArray:
+    """Return the squares of `_drawn`."""
+    squares = np.square(_drawn(size, degrees_of_freedom))
+    squares.setflags(write=False)
+    return squares
 
 
 def position_region(calibration: Calibration, probability: float = PROBABILITY) -> Ellipsoid:

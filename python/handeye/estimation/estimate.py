@@ -26,6 +26,7 @@ from handeye.types.camera import Camera
 from handeye.types.kinematics import Kinematics
 from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
+from handeye.types.probing import Tip
 from handeye.types.target import Target
 
 
@@ -89,6 +90,8 @@ class Estimate:
         What was found of the arm; empty and None without one.
     attribution
         What explains the misfit; None under the paper's model.
+    tips
+        Tips of touches where they were found, by name.
     unobservable
         Directions of X and Y that the views leave open; a weak prior stands in for them.
     """
@@ -117,6 +120,7 @@ class Estimate:
     link_errors: tuple[LinkError, ...] = ()
     arm_correction: ArmCorrection | None = None
     attribution: Finding | None = None
+    tips: dict[str, Tip] = field(default_factory=dict[str, Tip])
 
     @property
     def determined(self) -> bool:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from handeye import _core
 from handeye.estimation.confidence import PROBABILITY, radius
 from handeye.estimation.estimate import Estimate
 from handeye.types.arrays import FloatArray
@@ -9,8 +10,6 @@ from handeye.types.camera import Camera
 
 # Pixels that are looked at, across and down.
 GRID = (9, 7)
-# Steps of numerical derivatives, in deviations.
-_STEP = 1e-3
 
 
 def lens_within_px(estimate: Estimate, probability: float = PROBABILITY) -> float:
@@ -40,15 +39,9 @@ def _of_pixels(estimate: Estimate) -> FloatArray:
     covariance = estimate.covariance[12 : 12 + len(free), 12 : 12 + len(free)]
     camera = estimate.camera
     rays = _rays(camera)
+    _, _, in_parameters, _ = _core.project_jacobians(camera.lens, camera.parameters, rays)
     deviations = np.sqrt(np.diag(covariance))
-    moved = np.empty((2 * len(rays), len(free)))
-    for column, (index, deviation) in enumerate(zip(free, deviations, strict=True)):
-        step = np.zeros(len(camera.parameters))
-        step[index] = _STEP * max(deviation, 1e-12)
-        ahead, _ = camera.with_parameters(camera.parameters + step).project(rays)
-        behind, _ = camera.with_parameters(camera.parameters - step).project(rays)
-        moved[:, column] = ((ahead - behind) / (2 * step[index])).ravel()
-    moved = _without_turn(moved, camera, rays)
+    moved = _without_turn(in_parameters[:, :, list(free)].reshape(2 * len(rays), len(free)), camera, rays)
     # The mean square is a quadratic form of the parameters; its square root is the length of a vector.
     root = np.linalg.cholesky(moved.T @ moved / len(rays) + 1e-18 * np.diag(1 / deviations**2))
     return root.T @ covariance @ root
@@ -75,12 +68,8 @@ def _rays(camera: Camera) -> FloatArray:
 
 def _without_turn(off: FloatArray, camera: Camera, rays: FloatArray) -> FloatArray:
     """Return pixel differences (2 N, n) without what a small turn of the camera explains."""
-    here, _ = camera.project(rays)
-    turns = np.empty((2 * len(rays), 3))
-    for axis in range(3):
-        turn = np.zeros(3)
-        turn[axis] = 1e-6
-        there, _ = camera.project(rays + np.cross(turn, rays))
-        turns[:, axis] = ((there - here) / 1e-6).ravel()
+    _, in_points, _, _ = _core.project_jacobians(camera.lens, camera.parameters, rays)
+    turned: FloatArray = np.einsum("kij,akj->kia", in_points, np.cross(np.eye(3)[:, np.newaxis], rays))
+    turns = turned.reshape(2 * len(rays), 3)
     explained, *_ = np.linalg.lstsq(turns, off, rcond=None)
     return off - turns @ explained

@@ -111,7 +111,18 @@ class Check:
                 f"nothing has moved as far as {len(self.views)} views tell (p = {self.p_value:.2g}); a shift "
                 f"of the camera by {self.detectable_mm:.2g} mm would be found every second time"
             )
+        if not self.told_apart:
+            return (
+                f"something has moved (p = {self.p_value:.2g}): camera, board or arm, one picture does not "
+                f"tell which; if the camera, by {self.causes[0].translation_mm:.3g} mm and "
+                f"{self.causes[0].rotation_deg:.3g} deg"
+            )
         return f"something has moved (p = {self.p_value:.2g}): most likely {self.causes[0].words}"
+
+    @property
+    def told_apart(self) -> bool:
+        """Whether the views can tell what moved; one alone shows a shift, not of what."""
+        return len(self.views) > 1
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON."""
@@ -119,6 +130,7 @@ class Check:
             "p_value": self.p_value,
             "alarm": self.alarm,
             "moved": self.moved.value,
+            "told_apart": self.told_apart,
             "sentence": self.sentence,
             "detectable_mm": self.detectable_mm,
             "views": list(self.views),
@@ -195,7 +207,8 @@ def check_views(estimate: Estimate, views: Measurements, alarm: float = ALARM) -
                 0.5 * explained - 0.5 * count * float(np.log(max(len(rows.e), 2))),
             )
         )
-    causes.sort(key=lambda cause: -cause.log_likelihood)
+    # Of equals the camera first, as of one view all are.
+    causes.sort(key=lambda cause: (-round(cause.log_likelihood, 6), cause.moved is not Moved.CAMERA))
     # All at once, and each cause by itself: the more often it is asked, the less each may alarm.
     overall = _tail(squared / len(rows.e), len(rows.e), freedom)
     kinds = len({cause.moved for cause in causes}) + 1

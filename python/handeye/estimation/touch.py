@@ -145,9 +145,9 @@ def touch_rows(estimate: Estimate, touches: Touches) -> tuple[FloatArray, FloatA
     if free:
         moved = _camera_columns(estimate.camera, in_camera, touches.depth)[:, :, free]
         rows[:, :, 12 : 12 + len(free)] = -R_base_camera @ moved
-    constants, noise = _carried(estimate, touches.touched_from, touches.touching_rad, touches.points_m)
+    constants, noise = carried(estimate, touches.touched_from, touches.touching_rad, touches.points_m)
     if in_hand:
-        seeing, more = _carried(estimate, touches.seen_from, touches.seeing_rad, touches.points_m)
+        seeing, more = carried(estimate, touches.seen_from, touches.seeing_rad, touches.points_m)
         constants, noise = constants - seeing, noise + more
     if constants.shape[2]:
         rows[:, :, -constants.shape[2] :] = constants
@@ -186,10 +186,16 @@ def _act(transforms: FloatArray, points: FloatArray) -> FloatArray:
     return np.einsum("qij,qj->qi", transforms[:, :3, :3], points) + transforms[:, :3, 3]
 
 
-def _carried(
+def carried(
     estimate: Estimate, poses: FloatArray, joints: FloatArray | None, points: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """How points (Q, 3) that the flange carries move: with constants (Q, 3, k), noise (Q, 3, 3)."""
+    """How points (Q, 3) in the base move that the flange carries: with constants (Q, 3, k), noise (Q, 3, 3).
+
+    Raises
+    ------
+    InputError
+        The estimate knows the arm, and there are no joints.
+    """
     rotations = poses[:, :3, :3]
     at_flange = through_twist(_act(inverses(poses), points), rotations)
     at_base = through_twist(points, np.broadcast_to(np.eye(3), (len(points), 3, 3)))

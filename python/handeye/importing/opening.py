@@ -19,21 +19,22 @@ from handeye.datasets import (
     recording_warnings,
 )
 from handeye.datasets.bags import Contents
-from handeye.datasets.image_set import ImportOptions
+from handeye.datasets.image_set import ImportOptions, WrittenPoses
 from handeye.datasets.pose_list import stated_target
 from handeye.datasets.pose_pairs import PoseStreams
-from handeye.datasets.pose_rows import NOTHING_STATED
+from handeye.datasets.pose_rows import NOTHING_STATED, PoseRows
 from handeye.detection import Detection, Image, Reason, detect_all
 from handeye.errors import DetectionError, HandeyeError, InputError, UnstatedError
 from handeye.estimation import Measurements
 from handeye.importing.bag_choice import NOTHING_CHOSEN, BagOptions
 from handeye.importing.bags import Timing, pictures_of
 from handeye.importing.own_camera import calibrated_from_used_views, camera_of_views
-from handeye.importing.readings import compare
+from handeye.importing.readings import MIN_VIEWS, compare
 from handeye.importing.streams import pairs_of
-from handeye.importing.unstated import unstated
+from handeye.importing.unstated import misread, unstated
 from handeye.robots import Arm
 from handeye.types import Camera, Mounting, Recording, Target
+from handeye.types.arrays import FloatArray
 
 # So many images from the first on, all with a board of another size: the size was given wrongly, and looking
 # at the rest, which is slow where nothing is found, would only say so again.
@@ -203,7 +204,10 @@ def open_any(
     if isinstance(loaded, UnreadPoses):
         opened = _of_images(loaded.images, options.camera, progress or _nothing)
         raise told_by_pictures(loaded, opened.recording, options.mounting)
-    return _of_images(loaded, options.camera, progress or _nothing)
+    opened = _of_images(loaded, options.camera, progress or _nothing)
+    if loaded.written is not None:
+        _check_written(loaded, loaded.written, opened.recording)
+    return opened
 
 
 def _nothing(done: int, total: int) -> None:
@@ -323,10 +327,29 @@ def _check_size(camera: Camera, size: tuple[int, int], what: str) -> None:
 
 def told_by_pictures(unread: UnreadPoses, recording: Recording, mounting: Mounting | None) -> UnstatedError:
     """Return the error that says which way to read the robot's poses agrees with the pictures."""
-    measurements = Measurements.of_recording(recording)
-    places = {shot.name: row for row, shot in enumerate(unread.images.shots)}
-    kept = [places[view.name] for view in measurements.views]
+    rows, seen = _rows_and_target(unread.images, unread.rows, recording)
     mountings = tuple(Mounting) if mounting is None else (mounting,)
-    rows = unread.rows.select(kept)
-    agreements = compare(rows, unread.readings, measurements.camera_poses, mountings)
-    return unstated(unread, agreements, mounting_stated=mounting is not None, views=len(kept))
+    agreements = compare(rows, unread.readings, seen, mountings)
+    return unstated(unread, agreements, mounting_stated=mounting is not None, views=len(rows))
+
+
+def _check_written(images: ImageSet, written: WrittenPoses, recording: Recording) -> None:
+    """Refuse poses that fit the pictures under another reading than the one that is stated, and not under it.
+
+    Other mistakes are left to those who look for them: numbers tell more here than the poses made of them.
+    """
+    rows, seen = _rows_and_target(images, written.rows, recording)
+    stated = compare(rows, (written.reading,), seen, (recording.mounting,))
+    if len(rows) < MIN_VIEWS or any(agreement.fits for agreement in stated):
+        return
+    silent = replace(rows, stated=NOTHING_STATED, degrees=None)
+    error = misread(written, stated, compare(silent, silent.readings(), seen, (recording.mounting,)))
+    if error is not None:
+        raise error
+
+
+def _rows_and_target(images: ImageSet, rows: PoseRows, recording: Recording) -> tuple[PoseRows, FloatArray]:
+    """Return the rows of the views that are usable, and the poses of the target (N, 4, 4) in these."""
+    measurements = Measurements.of_recording(recording)
+    places = {shot.name: row for row, shot in enumerate(images.shots)}
+    return rows.select([places[view.name] for view in measurements.views]), measurements.camera_poses

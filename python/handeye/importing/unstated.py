@@ -1,11 +1,14 @@
-"""What to say where nothing says how poses are written: the reading that the pictures agree with."""
+"""What to say where poses do not say how they are written, or wrongly: the reading that the pictures have."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from handeye.datasets import UnreadPoses
+from handeye.datasets import Reading, UnreadPoses
+from handeye.datasets.image_set import WrittenPoses
 from handeye.datasets.pose_rows import same_meaning
 from handeye.errors import UnstatedError
 from handeye.importing.readings import CLEARLY, MIN_VIEWS, Agreement, distinct
+from handeye.notations.forms import Euler, Form, RotationVector, Vector
 from handeye.types import Mounting
 
 _MOST_NAMED = 4
@@ -59,6 +62,45 @@ def unstated(
         hint=_other_mounting(best, mounting_stated=mounting_stated),
         options=("--poses", file, *best.reading.options, *_mounting(best, is_stated=mounting_stated)),
     )
+
+
+def misread(
+    written: WrittenPoses, stated: Sequence[Agreement], agreements: Sequence[Agreement]
+) -> UnstatedError | None:
+    """Return the error that poses are written in another way than is stated; None if none agrees clearly.
+
+    Parameters
+    ----------
+    written
+        The rows and what is stated.
+    stated
+        How well that agrees, empty if it is no reading at all.
+    agreements
+        How well each reading agrees, the best first.
+    """
+    if not agreements or not agreements[0].fits:
+        return None
+    best, said = agreements[0], written.reading
+    if best.reading.notation.form == said.notation.form and best.reading.unit is said.unit:
+        return None  # Only the direction: the mounting may be wrong as well.
+    if any(rival.fits and rival.misfit < CLEARLY * best.misfit for rival in distinct(best, agreements)):
+        return None
+    apart = f", as stated {stated[0]}" if stated else ""
+    return UnstatedError(
+        f"{written.file} is stated to be {said}, and the pictures agree with {_described(best)}: they are "
+        f"{best} apart{apart}",
+        hint="or correct what the file itself says",
+        options=("--poses", written.file, *best.reading.options),
+        code="wrong_unit" if _in_degrees(best.reading) == _in_degrees(said) else "wrong_rotation",
+    )
+
+
+def _in_degrees(reading: Reading) -> Form:
+    """Return what numbers mean, whatever the unit of angles."""
+    form = reading.notation.form
+    if isinstance(form, Vector) and isinstance(form.rotation, (Euler, RotationVector)):
+        return replace(form, rotation=replace(form.rotation, degrees=True))
+    return form
 
 
 def _described(best: Agreement) -> str:

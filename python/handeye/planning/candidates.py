@@ -8,7 +8,7 @@ import numpy as np
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray
 from handeye.types.mounting import Mounting
-from handeye.types.pose import Pose
+from handeye.types.pose import Pose, inverses
 from handeye.types.view import View
 
 
@@ -60,7 +60,8 @@ class Pool:
 
     def motions(self, mounting: Mounting) -> FloatArray:
         """(N, 4, 4) A of the chain of each candidate."""
-        return np.array([mounting.chain(c.T_base_flange).matrix for c in self.candidates]).reshape(-1, 4, 4)
+        poses = np.array([c.T_base_flange.matrix for c in self.candidates]).reshape(-1, 4, 4)
+        return poses if mounting is Mounting.EYE_TO_HAND else inverses(poses)
 
     @property
     def joints(self) -> FloatArray | None:

@@ -9,13 +9,13 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from handeye import _core
 from handeye.errors import InputError
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
-from handeye.robots.frames import frames_of
-from handeye.types.arrays import FloatArray, finite_array
+from handeye.types.arrays import BoolArray, FloatArray, finite_array
 
 # Frames nearer to each other than this are one point.
 TOUCHES_ITSELF = "the arm would touch itself"
@@ -55,7 +55,12 @@ class Workspace:
         lower = finite_array(self.lower_m, (3,), "workspace: lower_m")
         upper = finite_array(self.upper_m, (3,), "workspace: upper_m")
         radii = self.link_radius_m, self.tool_radius_m
-        finite_array([self.floor_m, *radii], (3,), "workspace: floor and radii")
+        if not np.isfinite([self.floor_m, *radii]).all():
+            raise InputError(
+                f"workspace: floor at {self.floor_m} m, radii of {radii[0]} and {radii[1]} m",
+                code="not_finite",
+                hint="state the height of table or floor as a number",
+            )
         if (lower >= upper).any() or min(radii) < 0:
             raise InputError(
                 f"workspace: from {lower} to {upper}, expected a box with an inside, radii not negative",
@@ -94,7 +99,7 @@ class Body:
 
     def obstacles(self, joints: FloatArray) -> list[str | None]:
         """Say for each posture (N, n) what it runs into, None for nothing."""
-        frames = frames_of(self.arm, joints)
+        frames = self.arm.frames(joints)
         tools = (
             self.tool_points_m @ frames[:, -1, :3, :3].transpose(0, 2, 1) + frames[:, -1, np.newaxis, :3, 3]
         )
@@ -109,20 +114,13 @@ class Body:
         # The costliest question only of postures that nothing else speaks against.
         left = np.flatnonzero(~(beyond | outside | low))
         touching = np.zeros(len(joints), dtype=bool)
-        touching[left] = self._touches_itself(frames[left], tools[left])
-        answers: list[str | None] = []
-        for k in range(len(joints)):
-            if beyond[k]:
-                answers.append("a joint would be beyond its limits")
-            elif outside[k]:
-                answers.append("flange or tool would leave the workspace")
-            elif low[k]:
-                answers.append("the arm would touch the floor")
-            elif touching[k]:
-                answers.append(TOUCHES_ITSELF)
-            else:
-                answers.append(None)
-        return answers
+        touching[left] = self._touches_itself(np.concatenate([frames[left, :, :3, 3], tools[left]], axis=1))
+        return first_reasons(
+            (beyond, "a joint would be beyond its limits"),
+            (outside, "flange or tool would leave the workspace"),
+            (low, "the arm would touch the floor"),
+            (touching, TOUCHES_ITSELF),
+        )
 
     def obstacle_on_path(self, start: ArrayLike, end: ArrayLike) -> str | None:
         """Say what is in the way of the straight motion in joint space from posture to posture (n,)."""
@@ -147,7 +145,7 @@ class Body:
     @cached_property
     def _links(self) -> list[tuple[int, int]]:
         """Pairs of frames that have a link between them, base first."""
-        rest = frames_of(self.arm, np.zeros((1, len(self.arm))))[0, :, :3, 3]
+        rest = self.arm.frames(np.zeros((1, len(self.arm))))[0, :, :3, 3]
         pairs: list[tuple[int, int]] = []
         start = 0
         for end in range(1, len(self.arm) + 2):
@@ -159,7 +157,7 @@ class Body:
     @cached_property
     def _may_touch(self) -> list[tuple[tuple[int, int], tuple[int, int]]]:
         """Pairs of links that are not near each other by construction, with little between them."""
-        rest = frames_of(self.arm, np.zeros((1, len(self.arm))))[0, :, :3, 3]
+        rest = self.arm.frames(np.zeros((1, len(self.arm))))[0, :, :3, 3]
         links = self._links
         length = np.array([np.linalg.norm(rest[b] - rest[a]) for a, b in links])
         near = 2 * self.workspace.link_radius_m + 0.02
@@ -170,22 +168,33 @@ class Body:
             if length[i + 1 : j].sum() >= near
         ]
 
-    def _touches_itself(self, frames: FloatArray, tools: FloatArray) -> FloatArray:
-        space, origins = self.workspace, frames[:, :, :3, 3]
-        gaps: list[FloatArray] = []
-        if self._may_touch and self.solids is None:
-            (a, b), (c, d) = np.array(self._may_touch).transpose(1, 2, 0)
-            gap = _segment_distance(origins[:, a], origins[:, b], origins[:, c], origins[:, d])
-            gaps.append(gap - 2 * space.link_radius_m)
-        if len(self._links) > 3 and tools.shape[1] > 0:
-            a, b = np.array(self._links[:-3]).T
-            ball = np.repeat(tools, len(a), axis=1)
-            many = np.tile(a, tools.shape[1]), np.tile(b, tools.shape[1])
-            gap = _segment_distance(origins[:, many[0]], origins[:, many[1]], ball, ball)
-            gaps.append(gap - space.link_radius_m - space.tool_radius_m)
-        if not gaps:
-            return np.zeros(len(frames), dtype=bool)
-        return np.concatenate(gaps, axis=1).min(axis=1) < 0
+    @cached_property
+    def _capsules(self) -> tuple[list[tuple[int, int, int, int]], list[float]]:
+        """Pairs of capsules that must not overlap, by their ends, and the sum of the radii of each.
+
+        Ends are frames; the balls of what is mounted come behind these.
+        """
+        space, frames = self.workspace, len(self.arm) + 2
+        pairs = [(*one, *other) for one, other in self._may_touch] if self.solids is None else []
+        radii = [2 * space.link_radius_m] * len(pairs)
+        balls = [
+            (*link, frames + ball, frames + ball)
+            for ball in range(len(self.tool_points_m))
+            for link in self._links[:-3]
+        ]
+        return pairs + balls, radii + [space.link_radius_m + space.tool_radius_m] * len(balls)
+
+    def _touches_itself(self, points: FloatArray) -> BoolArray:
+        """(N,) whether capsules overlap where frames and what is mounted are at points (N, P, 3)."""
+        return _core.least_gaps(points, *self._capsules) < 0
+
+
+def first_reasons(*reasons: tuple[BoolArray, str]) -> list[str | None]:
+    """Return for each of N the first reason whose mask (N,) holds there, None for none."""
+    answers: NDArray[np.object_] = np.full(len(reasons[0][0]), None, dtype=object)
+    for holds, reason in reversed(reasons):
+        answers[holds] = reason
+    return answers.tolist()
 
 
 def straight_path(start: ArrayLike, end: ArrayLike) -> FloatArray:
@@ -193,17 +202,3 @@ def straight_path(start: ArrayLike, end: ArrayLike) -> FloatArray:
     first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     count = max(2, int(np.ceil(np.abs(last - first).max() / _PATH_STEP_RAD)) + 1)
     return first + np.linspace(0, 1, count)[:, np.newaxis] * (last - first)
-
-
-def _segment_distance(p0: FloatArray, p1: FloatArray, q0: FloatArray, q1: FloatArray) -> FloatArray:
-    """(...) distance between segments p0 p1 and q0 q1, each (..., 3) (Ericson 2005, section 5.1.9)."""
-    d1, d2, r = p1 - p0, q1 - q0, p0 - q0
-    a, e = np.einsum("...i,...i", d1, d1), np.einsum("...i,...i", d2, d2)
-    b, c, f = (np.einsum("...i,...i", x, y) for x, y in ((d1, d2), (d1, r), (d2, r)))
-    tiny = 1e-12
-    determinant = a * e - b * b
-    s = np.clip(np.where(determinant > tiny, (b * f - c * e) / np.maximum(determinant, tiny), 0.0), 0, 1)
-    t = np.where(e > tiny, (b * s + f) / np.maximum(e, tiny), 0.0)
-    clamped = np.clip(t, 0, 1)
-    s = np.where(a > tiny, np.clip((b * clamped - c) / np.maximum(a, tiny), 0, 1), 0.0)
-    return np.linalg.norm((p0 + s[..., np.newaxis] * d1) - (q0 + clamped[..., np.newaxis] * d2), axis=-1)

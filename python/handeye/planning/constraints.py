@@ -1,22 +1,24 @@
 """What makes a posture usable as a view: distance, tilt, sight, and room for the arm there and on the way."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate
 from handeye.estimation.lens_confidence import lens_deviation_px
-from handeye.planning.collisions import Body
-from handeye.planning.prediction import Sight
-from handeye.planning.visibility import obstacles
+from handeye.planning.collisions import Body, first_reasons
+from handeye.planning.prediction import Prediction, Sight
 from handeye.robots import Arm
 from handeye.types import Mounting
 from handeye.types.arrays import FloatArray, IndexArray
+from handeye.types.pose import inverses
 
 # A lens that is known this well needs no room of its own.
 KNOWN_LENS_PX = 3.0
+NOT_WHOLE = "the target would not be whole in the image"
 NEAR_FAILURE = "near to where it failed before"
 
 
@@ -91,17 +93,33 @@ class ViewConstraints:
         """The arm."""
         return self.body.arm
 
-    def passing(self, joints: FloatArray, *, body: bool = True) -> tuple[IndexArray, dict[int, str]]:
+    @cached_property
+    def prediction(self) -> Prediction:
+        """What the estimate predicts of views."""
+        return Prediction(self.estimate, self.sight)
+
+    def passing(
+        self, joints: FloatArray, motions: FloatArray | None = None, *, body: bool = True
+    ) -> tuple[IndexArray, dict[int, str]]:
         """Return which of postures (N, n) pass, in their order, and for which first reason others do not.
 
-        Without `body` it is left to the caller whether the arm can stand there.
+        `motions` (N, 4, 4) are those of `motions` at the postures, if they are known. Without `body` it is
+        left to the caller whether the arm can stand there.
         """
+        at = self.motions(joints) if motions is None else motions
         left = np.arange(len(joints))
         turned_down: dict[int, str] = {}
         # Each is asked only of what the ones before it let through; the costly ones come last.
-        standing = (self.body.obstacles,) if body else ()
-        for reasons in (self._bad_views, self._hidden, *standing, self._failed_before):
-            why = reasons(joints[left])
+        questions: list[Callable[[IndexArray], list[str | None]]] = [
+            lambda left: self._bad_views(at[left]),
+            lambda left: self._hidden(at[left]),
+            lambda left: self.body.obstacles(joints[left]),
+            lambda left: self._failed_before(joints[left]),
+        ]
+        if not body:
+            del questions[2]
+        for reasons in questions:
+            why = reasons(left)
             turned_down |= {
                 int(index): reason for index, reason in zip(left, why, strict=True) if reason is not None
             }
@@ -111,37 +129,29 @@ class ViewConstraints:
     def motions(self, joints: FloatArray) -> FloatArray:
         """(N, 4, 4) A of the chain at postures (N, n)."""
         poses = self.arm.forward(joints).reshape(-1, 4, 4)
-        if self.estimate.mounting is Mounting.EYE_TO_HAND:
-            return poses
-        return np.asarray(np.linalg.inv(poses), dtype=np.float64)
+        return poses if self.estimate.mounting is Mounting.EYE_TO_HAND else inverses(poses)
 
-    def _bad_views(self, joints: FloatArray) -> Sequence[str | None]:
+    def _bad_views(self, motions: FloatArray) -> list[str | None]:
         estimate = self.estimate
-        poses = estimate.X.matrix @ self.motions(joints) @ estimate.Y.matrix
+        poses = estimate.X.matrix @ motions @ estimate.Y.matrix
         middle = poses[:, :3, :3] @ estimate.target.points.mean(axis=0) + poses[:, :3, 3]
         distance = np.linalg.norm(middle, axis=1)
         cosine = np.einsum("ki,ki->k", poses[:, :3, 2], middle) / np.maximum(distance, 1e-9)
         near, far = self.limits.distance_m
-        answers: list[str | None] = []
-        for length, toward in zip(distance, cosine, strict=True):
-            if not near <= length <= far:
-                answers.append("too near to the target or too far from it")
-            elif toward < np.cos(self.limits.tilt_rad):
-                answers.append("the target would be seen too obliquely")
-            else:
-                answers.append(None)
-        return answers
+        return first_reasons(
+            (~((near <= distance) & (distance <= far)), "too near to the target or too far from it"),
+            (cosine < np.cos(self.limits.tilt_rad), "the target would be seen too obliquely"),
+        )
 
-    def _hidden(self, joints: FloatArray) -> Sequence[str | None]:
-        why = obstacles(self.estimate, self.motions(joints), self.sight)
-        return [None if reason is None else "the target would not be whole in the image" for reason in why]
+    def _hidden(self, motions: FloatArray) -> list[str | None]:
+        return first_reasons((~self.prediction.in_sight(motions), NOT_WHOLE))
 
-    def _failed_before(self, joints: FloatArray) -> Sequence[str | None]:
+    def _failed_before(self, joints: FloatArray) -> list[str | None]:
         if len(self.shunned) == 0:
             return [None] * len(joints)
         to_failed = _distances(joints, self.shunned)
         radius = 0.5 * _distances(self.shunned, self.taken).min(axis=1)
-        return [NEAR_FAILURE if near else None for near in (to_failed < radius).any(axis=1)]
+        return first_reasons(((to_failed < radius).any(axis=1), NEAR_FAILURE))
 
 
 def sight_of(estimate: Estimate, limits: ViewLimits) -> Sight:

@@ -9,19 +9,21 @@ import numpy as np
 from handeye.estimation.estimate import Estimate
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Body, Workspace
-from handeye.planning.constraints import ViewConstraints, ViewLimits, mounted_points, sight_of
+from handeye.planning.constraints import NOT_WHOLE, ViewConstraints, ViewLimits, mounted_points, sight_of
 from handeye.planning.prediction import Sight
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
+from handeye.types.pose import inverses
 
 
 @dataclass(frozen=True, eq=False)
 class FeasiblePool:
     """Candidates with the joints that reach them, how many were turned down for which reason, and by what.
 
-    `ruled_out` has the postures (M, n) that were turned down, `reasons` why, in the same order.
+    `ruled_out` has the poses (M, 4, 4) of the flange that were turned down, `reasons` why, in the same order;
+    those that the arm does not reach are only counted.
     """
 
     pool: Pool
@@ -95,8 +97,6 @@ class Generator:
             distance to the closest view that worked.
         """
         taken = np.array(postures, dtype=np.float64)
-        joints = np.concatenate([self._on_shell(estimate, taken, random), self._in_joints(taken, random)])
-        unreached = self.around_target + self.around_postures - len(joints)
         constraints = ViewConstraints(
             self.body(estimate),
             estimate,
@@ -105,26 +105,31 @@ class Generator:
             taken,
             np.array(shunned, dtype=np.float64),
         )
+        around_target, hidden = self._on_shell(constraints, random)
+        joints = np.concatenate([around_target, self._in_joints(taken, random)])
+        unreached = self.around_target + self.around_postures - len(hidden) - len(joints)
         passed, reason_of = constraints.passing(joints)
-        ruled_out, joints = joints[list(reason_of)], joints[passed]
-        turned_down = Counter(reason_of.values())
+        ruled_out = np.concatenate([self.arm.forward(joints[list(reason_of)]), hidden])
+        reasons = (*reason_of.values(), *[NOT_WHOLE] * len(hidden))
+        joints = joints[passed]
+        turned_down = Counter(reasons)
         turned_down["the arm does not reach the pose"] = unreached
         width = len(str(len(joints)))
         names = [f"{prefix}_{i:0{width}d}" for i in range(1, len(joints) + 1)]
         found = {name: count for name, count in turned_down.items() if count > 0}
         pool = candidates_at(self.arm, names, joints)
-        return FeasiblePool(
-            pool,
-            dict(zip(names, joints, strict=True)),
-            found,
-            constraints,
-            ruled_out,
-            tuple(reason_of.values()),
-        )
+        by_name = dict(zip(names, joints, strict=True))
+        return FeasiblePool(pool, by_name, found, constraints, ruled_out, reasons)
 
-    def _on_shell(self, estimate: Estimate, taken: FloatArray, random: np.random.Generator) -> FloatArray:
-        """Joints (M, n) of camera poses that look at the target from all around, rolled."""
-        n = self.around_target
+    def _on_shell(
+        self, constraints: ViewConstraints, random: np.random.Generator
+    ) -> tuple[FloatArray, FloatArray]:
+        """Joints (M, n) of camera poses that look at the target from all around, rolled.
+
+        And poses (K, 4, 4) of the flange at which the target would not be whole in the image: whether the arm
+        reaches these is not asked.
+        """
+        n, estimate, taken = self.around_target, constraints.estimate, constraints.taken
         (near, far), steepest = self.limits.distance_m, np.cos(self.limits.tilt_rad)
         distance = random.uniform(near, far, n)
         tilt = np.arccos(random.uniform(steepest, 1.0, n))
@@ -138,11 +143,12 @@ class Generator:
         aim = np.column_stack([off * np.array(camera.size_px) / camera.parameters[:2], np.ones(n)])
         looks[:, :3, 3] = aim * distance[:, np.newaxis] - looks[:, :3, :3] @ middle
         chain = np.linalg.inv(estimate.X.matrix) @ looks @ np.linalg.inv(estimate.Y.matrix)
-        flange = np.linalg.inv(chain) if estimate.mounting is Mounting.EYE_IN_HAND else chain
+        flange = inverses(chain) if estimate.mounting is Mounting.EYE_IN_HAND else chain
         starts = taken[random.integers(len(taken), size=n)]
+        seen = constraints.prediction.in_sight(chain)
         # One start each: of 359 poses that four starts reach, one reaches 341, in a quarter of the time.
-        joints, reached = self.arm.inverse_all(flange, starts, attempts=1)
-        return joints[np.flatnonzero(reached)]
+        joints, reached = self.arm.inverse_all(flange[seen], starts[seen], attempts=1)
+        return joints[np.flatnonzero(reached)], flange[~seen]
 
     def _in_joints(self, taken: FloatArray, random: np.random.Generator) -> FloatArray:
         starts = taken[random.integers(len(taken), size=self.around_postures)]
@@ -156,8 +162,8 @@ def candidates_at(arm: Arm, names: Sequence[str], joints: FloatArray) -> Pool:
     poses = arm.forward(joints) if len(joints) else np.zeros((0, 4, 4))
     return Pool(
         tuple(
-            Candidate(name, Pose(pose), tuple(q.tolist()))
-            for name, pose, q in zip(names, poses, joints, strict=True)
+            Candidate(name, pose, tuple(q))
+            for name, pose, q in zip(names, Pose.of_matrices(poses), joints.tolist(), strict=True)
         )
     )
 

@@ -53,6 +53,8 @@ class Hindsight:
         Recorded poses that would help most if pictures were taken there once more.
     then
         Radii predicted after those.
+    final
+        What all views say.
     """
 
     steps: tuple[After, ...]
@@ -60,6 +62,7 @@ class Hindsight:
     enough: int | None
     repeat: tuple[str, ...]
     then: Within | None
+    final: Estimate
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
@@ -114,7 +117,7 @@ def hindsight(measurements: Measurements, estimator: Estimator) -> Hindsight:
         good = [k for k, one in enumerate(planned) if one.determined and _reaches(one, final)]
         enough = START + good[0] if good else None
     repeat, then = _repeated(measurements, final)
-    return Hindsight(steps, by_plan, enough, repeat, then)
+    return Hindsight(steps, by_plan, enough, repeat, then, final)
 
 
 def _estimates(

@@ -7,7 +7,7 @@ import numpy as np
 from handeye import _core
 from handeye.errors import DegenerateError
 from handeye.estimation.estimate import Estimate
-from handeye.types.arrays import FloatArray
+from handeye.types.arrays import BoolArray, FloatArray
 from handeye.types.pose import Pose
 
 # Least known directions of X and Y along which sigma points are laid, a metre and a radian weighing alike.
@@ -75,6 +75,10 @@ class Prediction:
             fewest=1 if sight.known else sight.fewest or estimate.target.point_count,
         )
 
+    def in_sight(self, motions: FloatArray) -> BoolArray:
+        """(N,) whether views at `motions` (N, 4, 4) would show enough of the target, its face or its back."""
+        return np.array(self._predictor.in_sight(motions), dtype=bool)
+
     def gains(
         self, criterion: _core.Criterion, motions: FloatArray, joints: FloatArray | None = None
     ) -> FloatArray:
@@ -92,7 +96,7 @@ class Prediction:
         """
         # What the arm does, and what a view tells of the camera, is asked only where it shows the target.
         gains = np.full(len(motions), np.nan)
-        seen = np.flatnonzero(self._predictor.in_sight(motions))
+        seen = np.flatnonzero(self.in_sight(motions))
         arm = self._arm(None if joints is None else joints[seen])
         gains[seen] = self._predictor.gains(self._belief, criterion, motions[seen], arm=arm)
         return gains

@@ -19,7 +19,6 @@ from handeye.planning.constraints import ViewConstraints
 from handeye.planning.feasibility import FeasiblePool, candidates_at
 from handeye.planning.planner import PlannerOptions
 from handeye.planning.policies import Policy
-from handeye.planning.prediction import Prediction
 from handeye.planning.travel import Travel
 from handeye.robots import Arm
 from handeye.types.arrays import FloatArray, IndexArray
@@ -136,16 +135,15 @@ class _Scorer:
             criterion,
             travel,
         )
-        self._prediction = Prediction(constraints.estimate, constraints.sight)
 
     def __call__(self, joints: FloatArray) -> FloatArray:
         """(N,) worth of postures (N, n) where the arm can stand; NaN for what cannot be taken anyway."""
-        passed, _ = self._constraints.passing(joints, body=False)
+        motions = self._constraints.motions(joints)
+        passed, _ = self._constraints.passing(joints, motions, body=False)
         worth = np.full(len(joints), np.nan)
         if len(passed) > 0:
             some = joints[passed]
-            motions = self._constraints.motions(some)
-            gains = self._prediction.gains(self._criterion, motions, some)
+            gains = self._constraints.prediction.gains(self._criterion, motions[passed], some)
             weighed = self._policy.worth(gains, self._travel.seconds(some))
             worth[passed] = gains if weighed is None else weighed
         return worth

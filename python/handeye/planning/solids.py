@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from handeye.errors import InputError
 from handeye.robots import Arm
-from handeye.robots.frames import frames_of
 from handeye.robots.shapes import Shape
 from handeye.types.arrays import FloatArray, finite_array
 
@@ -75,7 +74,7 @@ class SolidLinks:
 
     def _moved(self, joints: FloatArray) -> Any:  # noqa: ANN401 - a generator of moments
         """Move all shapes to one posture after the other."""
-        poses = frames_of(self._arm, joints)[:, self._frames] @ self._placements
+        poses = self._arm.frames(joints)[:, self._frames] @ self._placements
         for posture in poses:
             for body, pose in zip(self._objects, posture, strict=True):
                 body.setTransform(self._fcl.Transform(pose[:3, :3], pose[:3, 3]))

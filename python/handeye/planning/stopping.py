@@ -22,6 +22,7 @@ class StopReason(StrEnum):
     GAIN_BELOW_THRESHOLD = "gain_below_threshold"
     ACCURACY_REACHED = "accuracy_reached"
     NO_CANDIDATE = "no_candidate"
+    OUT_OF_REACH = "out_of_reach"
 
 
 @dataclass(frozen=True)

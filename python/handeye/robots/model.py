@@ -158,6 +158,17 @@ class Arm:
         flat, shape = self._positions(joints)
         return self._chain.forward(flat).reshape(*shape, 4, 4)
 
+    def frames(self, joints: ArrayLike) -> FloatArray:
+        """(..., n + 2, 4, 4) poses in the base at joint positions (..., n): the base itself, joints, flange.
+
+        Raises
+        ------
+        InputError
+            As `forward`.
+        """
+        flat, shape = self._positions(joints)
+        return self._chain.frames(flat).reshape(*shape, len(self) + 2, 4, 4)
+
     def jacobian(self, joints: ArrayLike, frame: str = "flange") -> FloatArray:
         """(..., 6, n) twists `[rho; phi]` of the flange per joint at positions (..., n).
 

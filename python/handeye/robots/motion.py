@@ -6,6 +6,7 @@ or have its base turned by half a turn. Both are constant transforms, found from
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -87,6 +88,10 @@ class ArmKinematics:
         Where the first joint sits says where the base is, and the place and angle of the last along its own
         axis where the flange is: matters of names, and left out.
         """
+        return self._link_twists
+
+    @cached_property
+    def _link_twists(self) -> FloatArray:
         count = len(self.arm)
         ways: list[FloatArray] = []
         for i in range(1, count):
@@ -97,7 +102,9 @@ class ArmKinematics:
                     way = np.zeros((count, 6))
                     way[i, first : first + 3] = direction
                     ways.append(way)
-        return np.moveaxis(np.array(ways).reshape(-1, count, 6), 0, 2)
+        twists = np.moveaxis(np.array(ways).reshape(-1, count, 6), 0, 2)
+        twists.flags.writeable = False
+        return twists
 
     def link_jacobians(self, mounting: Mounting, joints: FloatArray) -> FloatArray:
         """(K, 6, m) L at joint positions (K, n): truly ``A = exp(L l) A_reported``, l metres and radians."""

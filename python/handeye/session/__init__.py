@@ -1,6 +1,6 @@
 """The closed loop: the arm moves, the camera looks, every attempt is written down."""
 
-from handeye.session.attempt import Cell, Patience
+from handeye.session.attempt import Cell, Timeouts
 from handeye.session.choosing import ArmChooser
 from handeye.session.deciding import Chooser, EndReason, Halt, Situation, Step
 from handeye.session.entry import Entry, Failure
@@ -22,7 +22,6 @@ __all__ = [
     "Failure",
     "Halt",
     "Observer",
-    "Patience",
     "Requested",
     "Session",
     "SessionStore",
@@ -31,6 +30,7 @@ __all__ = [
     "Situation",
     "Start",
     "Step",
+    "Timeouts",
     "Wish",
     "create_session",
     "is_session",

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-import cv2
 import numpy as np
 
 from handeye.cameras.protocol import BAD_FRAME, Frame, Grey, ImageSource, checked_frame
@@ -37,7 +36,7 @@ STILL_M, STILL_RAD = 1e-5, 1e-4
 
 
 @dataclass(frozen=True)
-class Patience:
+class Timeouts:
     """How long drivers may take, in seconds, and how far off a motion may end to count as reached."""
 
     move_s: float = 60.0
@@ -51,7 +50,7 @@ class Patience:
             if not value > 0:
                 raise InputError(f"{name} {value}, expected above zero", code="out_of_range")
 
-    def without_clock(self) -> "Patience":
+    def without_clock(self) -> "Timeouts":
         """Return the same without limits of time: simulated drivers answer, and no clock is looked at."""
         return replace(self, move_s=math.inf, read_s=math.inf, grab_s=math.inf)
 
@@ -112,7 +111,7 @@ class Cell:
     workspace: Workspace | None
     camera: Camera
     target: Target
-    patience: Patience = field(default_factory=Patience)
+    timeouts: Timeouts = field(default_factory=Timeouts)
     confirm: Callable[[Goal], bool] | None = None
     solids: SolidLinks | None = None
     speed_rad_s: float = math.inf
@@ -124,7 +123,7 @@ class Cell:
     def stop(self) -> str | None:
         """Stop the arm, also while a call runs; say why that is not confirmed, None if it is."""
         try:
-            self.robot_calls.beside(self.patience.read_s, self.robot.stop)
+            self.robot_calls.beside(self.timeouts.read_s, self.robot.stop)
         except DeviceError as error:
             return error.message
         return None
@@ -137,7 +136,7 @@ class Cell:
         DeviceError
             It does not say, or what it says cannot be true. `expected` helps to name what is wrong.
         """
-        answer = self.robot_calls.run(self.patience.read_s, self.robot.read_pose)
+        answer = self.robot_calls.run(self.timeouts.read_s, self.robot.read_pose)
         if self.arm is None or self.workspace is None:
             reading = typed_reading(answer)
         else:
@@ -187,7 +186,7 @@ def attempt(
     timings["move"] = time.monotonic() - started
     note = ""
     if not is_near(
-        goal.T_base_flange, reading.T_base_flange, cell.patience.reached_m, cell.patience.reached_rad
+        goal.T_base_flange, reading.T_base_flange, cell.timeouts.reached_m, cell.timeouts.reached_rad
     ):
         note = f"ended {_off(goal, reading)} from the goal; the pose read back is used"
         why = _not_there(cell, reading, estimate)
@@ -196,7 +195,7 @@ def attempt(
             return Missed(Failure.ELSEWHERE, f"{note.split(';')[0]}: {why}", moved=True, standing=reading)
     started = time.monotonic()
     try:
-        frame = checked_frame(cell.camera_calls.run(cell.patience.grab_s, cell.source.grab, goal.label))
+        frame = checked_frame(cell.camera_calls.run(cell.timeouts.grab_s, cell.source.grab, goal.label))
     except DeviceError as error:
         known = {"timeout": Failure.CAMERA_TIMEOUT, "busy": Failure.CAMERA_TIMEOUT}
         known |= {BAD_FRAME: Failure.BAD_IMAGE}
@@ -220,7 +219,7 @@ def _go(cell: Cell, goal: Goal, estimate: Estimate | None) -> Reading | Missed:
     """See where the arm stands, check the way, go, and see where it stands then."""
     try:
         # A camera that still hangs would not see what comes; a robot that does must not be told anything new.
-        cell.camera_calls.wait(cell.patience.grab_s)
+        cell.camera_calls.wait(cell.timeouts.grab_s)
     except DeviceError as error:
         return Missed(Failure.CAMERA_TIMEOUT, error.message, moved=False)
     try:
@@ -234,7 +233,7 @@ def _go(cell: Cell, goal: Goal, estimate: Estimate | None) -> Reading | Missed:
         return Missed(Failure.NOT_CONFIRMED, "not confirmed", moved=False, standing=before)
     cell.observer.goes(goal)
     try:
-        cell.robot_calls.run(cell.patience.move_s, cell.robot.move_to, goal)
+        cell.robot_calls.run(cell.timeouts.move_s, cell.robot.move_to, goal)
     except DeviceError as error:
         return _after_failed_motion(cell, before, error)
     try:
@@ -263,7 +262,7 @@ def _after_failed_motion(cell: Cell, before: Reading, error: DeviceError) -> Mis
             detail = f"{detail}; stop: {stopped}"
     try:
         # The call may come back only now, and is waited for: one command at a time.
-        cell.robot_calls.wait(cell.patience.move_s)
+        cell.robot_calls.wait(cell.timeouts.move_s)
         after = cell.read()
     except DeviceError as second:
         return Missed(Failure.ROBOT_FAILED, f"{detail}; then {second.message}", moved=True)
@@ -329,9 +328,3 @@ def _look(
 
 def _digest(content: bytes) -> str:
     return hashlib.blake2b(content, digest_size=16).hexdigest()
-
-
-def encoded(image: Grey) -> bytes:
-    """Return an image as PNG."""
-    _, data = cv2.imencode(".png", image)
-    return data.tobytes()

@@ -190,9 +190,7 @@ class ArmChooser:
                     more["refined"] = climbed[name]
                 pose = answer.candidate.T_base_flange
                 goal = self._goal(situation, pose, tuple(joints_of[name].tolist()))
-                considered = Considered(
-                    planner.pool, planner.gains(), self._arm.forward(drawn.ruled_out), drawn.reasons
-                )
+                considered = Considered(planner.pool, planner.gains(), drawn.ruled_out, drawn.reasons)
                 return Step(
                     goal, "plan", decision_of(answer, estimate, more), estimate, considered=considered
                 )
@@ -219,10 +217,9 @@ class ArmChooser:
         if not self._start.posture_known:
             return None
         for entry in reversed(situation.entries):
-            if entry.standing_rad is not None:
-                return entry.standing_rad
-            if entry.view is not None:
-                return situation.joints(entry.view)
-            if entry.moved:
-                return entry.goal_joints
+            told = None if entry.view is None else situation.joints(entry.view)
+            for joints in (entry.standing_rad, told, entry.goal_joints if entry.moved else None):
+                # Older sessions may hold readings that are not of this arm.
+                if joints is not None and len(joints) == len(self._arm):
+                    return joints
         return self._start.joints_rad

@@ -87,9 +87,9 @@ def prepare(
     workspace = configuration.workspace()
     person = person or Person(_nobody, lambda _: None)
     robot = open_robot(configuration.driver, person, arm, joints_told=_told(start))
-    source = open_camera(configuration.images, robot, person, configuration.patience.grab_s)
+    source = open_camera(configuration.images, robot, person, configuration.timeouts.grab_s)
     if camera is None:
-        camera = nominal_camera(_pictured_size(source, configuration.patience.grab_s), configuration.lens)
+        camera = nominal_camera(_pictured_size(source, configuration.timeouts.grab_s), configuration.lens)
         configuration = replace(configuration, camera_known=False)
     cell = Cell(
         robot,
@@ -98,7 +98,7 @@ def prepare(
         workspace,
         camera,
         target,
-        configuration.patience,
+        configuration.timeouts,
         confirm,
         solids,
         configuration.speed_rad_s,
@@ -260,7 +260,7 @@ def _replayed(
         None,
         source.camera,
         source.target,
-        configuration.patience,
+        configuration.timeouts,
         confirm,
         observer=observer,
     )
@@ -323,7 +323,7 @@ def _simulated(
     cell = replace(
         cell,
         workspace=workspace,
-        patience=configuration.patience.without_clock(),
+        timeouts=configuration.timeouts.without_clock(),
         confirm=confirm,
         solids=solids,
         speed_rad_s=configuration.speed_rad_s,

@@ -26,6 +26,7 @@ class EndReason(StrEnum):
     ACCURACY_REACHED = "accuracy_reached"
     VIEWS_TAKEN = "views_taken"
     NO_CANDIDATE = "no_candidate"
+    OUT_OF_REACH = "out_of_reach"
     NO_START = "no_start"
     TOO_MANY_FAILURES = "too_many_failures"
     ROBOT_HANGS = "robot_hangs"
@@ -145,6 +146,7 @@ def halt_of(stop: Stop) -> Halt:
     known = {
         StopReason.ACCURACY_REACHED: EndReason.ACCURACY_REACHED,
         StopReason.NO_CANDIDATE: EndReason.NO_CANDIDATE,
+        StopReason.OUT_OF_REACH: EndReason.OUT_OF_REACH,
     }
     return Halt(known.get(stop.reason, EndReason.VIEWS_TAKEN), stop.sentence)
 

@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -16,7 +16,7 @@ from handeye.planning.constraints import ViewLimits
 from handeye.planning.policies import make_policy
 from handeye.robots import Arm
 from handeye.robots.simulated import ArmErrors
-from handeye.session.attempt import Patience
+from handeye.session.attempt import Timeouts
 from handeye.session.drivers import MANUAL, REPLAY
 from handeye.session.faults import FaultRates
 from handeye.session.simulated import ORDINARY, usual_errors
@@ -74,6 +74,8 @@ class Configuration:
         How well such a camera is to be known, see `Wish`.
     touch_mm, work
         Touch error to reach in place of the accuracy, and what is seen and touched.
+    anyway
+        Go on although the accuracy is out of reach, see `Wish`.
     """
 
     robot: str | None
@@ -94,13 +96,14 @@ class Configuration:
     floor_m: float = 0.0
     collisions: Collisions = Collisions.AUTO
     limits: ViewLimits = field(default_factory=ViewLimits)
-    patience: Patience = field(default_factory=Patience)
+    timeouts: Timeouts = field(default_factory=Timeouts)
     camera_known: bool = True
     lens: str | None = None
     accuracy_px: float = 1.0
     simulation: Simulation = field(default_factory=Simulation)
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
+    anyway: bool = False
 
     @property
     def is_simulated(self) -> bool:
@@ -133,6 +136,7 @@ class Configuration:
             accuracy_px=None if self.camera_known else self.accuracy_px,
             touch_mm=self.touch_mm,
             work=self.work,
+            anyway=self.anyway,
         )
 
     def workspace(self) -> Workspace:
@@ -165,6 +169,12 @@ class Configuration:
         InputError
             A missing or unusable field.
         """
+        values = data
+        if isinstance(values, dict) and "patience" in values:
+            # As sessions of earlier versions call it.
+            document = dict(cast("dict[str, Any]", values))
+            document["timeouts"] = document.pop("patience")
+            return read_document(document, cls, "settings")
         return read_document(data, cls, "settings")
 
 

@@ -11,7 +11,7 @@ from handeye.planning.collisions import Body, Workspace
 from handeye.robots import Arm
 from handeye.robots.protocol import Robot
 from handeye.robots.simulated import ArmErrors, SimulatedArm
-from handeye.session.attempt import Cell, Patience
+from handeye.session.attempt import Cell, Timeouts
 from handeye.session.faults import FaultRates, FaultyCamera, FaultyRobot
 from handeye.session.starting import Start
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Target, Truth
@@ -114,7 +114,7 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
     if options.faults is not None:
         source = FaultyCamera(source, options.faults, options.seed)
         driver = FaultyRobot(robot, options.faults, options.seed)
-    cell = Cell(driver, source, arm, workspace, known, options.target, Patience().without_clock())
+    cell = Cell(driver, source, arm, workspace, known, options.target, Timeouts().without_clock())
     recording = Recording(
         f"simulated {arm.name} {options.seed}",
         options.mounting,

@@ -20,7 +20,8 @@ from typing import IO, Any
 
 from handeye.datasets import write_recording
 from handeye.datasets.reading import existing_folder, is_file, reason
-from handeye.datasets.recording_format import ViewsApart, read_views_apart, write_empty_recording
+from handeye.datasets.recording_format import ViewsApart, read_views_apart
+from handeye.datasets.recording_writing import RecordingFolder, write_empty_recording
 from handeye.datasets.writing import new_folder, remove_partials, replace_file, write_file
 from handeye.errors import InputError, OutputError
 from handeye.session.entry import Entry, views_of
@@ -60,6 +61,7 @@ class SessionStore:
         self.begun_with = begun_with
         self.self_calibration = self_calibration
         self._recording = recording
+        self._on_disk = RecordingFolder(folder)
         self._journal = journal
         self._lock = lock
 
@@ -121,7 +123,7 @@ class SessionStore:
             The system refuses to write.
         """
         self._recording = replace(self._recording, truth=truth)
-        write_recording(self._recording, self.folder, replace=True)
+        self._on_disk.update(self._recording)
 
     def close(self) -> None:
         """Let another process open the session."""
@@ -137,7 +139,7 @@ class SessionStore:
         """
         grown = self._recording.with_views(views_of(self.entries))
         self._recording = grown if self.self_calibration is None else self.self_calibration.put_into(grown)
-        write_recording(self._recording, self.folder, replace=True)
+        self._on_disk.update(self._recording)
 
 
 def create_session(folder: Path, recording: Recording, settings: Mapping[str, Any]) -> SessionStore:

@@ -4,10 +4,11 @@ import time
 from dataclasses import replace
 from functools import partial
 
+from handeye.datasets.png_writing import png_bytes
 from handeye.detection import Detection
 from handeye.errors import HandeyeError, OutputError, printable
 from handeye.estimation import Estimate, view_pose
-from handeye.session.attempt import Cell, Missed, Seen, attempt, encoded
+from handeye.session.attempt import Cell, Missed, Seen, attempt
 from handeye.session.deciding import Step
 from handeye.session.entry import Entry, Failure
 from handeye.session.judging import foreseen, labeled, objection, unchanged
@@ -64,7 +65,7 @@ class Taker:
             entry = replace(
                 entry, view=view, detail=seen.note, image_digest=seen.digest, standing_rad=standing
             )
-            image = None if seen.image is None else encoded(seen.image)
+            image = None if seen.image is None else png_bytes(seen.image)
         self._write(entry, image)
         return entry
 
@@ -121,7 +122,7 @@ class Taker:
 
     def _write(self, entry: Entry, image: bytes | None) -> None:
         """Write an attempt down; where the disk refuses, wait and ask again before giving up."""
-        for patience in (1, 2, 0):
+        for pauses in (1, 2, 0):
             try:
                 if len(self._store.entries) >= entry.number:  # written, but the recording lagged behind
                     return
@@ -130,6 +131,6 @@ class Taker:
                 self._store.append(entry)
                 return
             except OutputError:
-                if patience == 0:
+                if pauses == 0:
                     raise
-                time.sleep(patience * _WRITE_PAUSE_S)
+                time.sleep(pauses * _WRITE_PAUSE_S)

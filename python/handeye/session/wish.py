@@ -8,6 +8,7 @@ from handeye.estimation import Estimate, Measurements
 from handeye.estimation.work import Work
 from handeye.planning.policies import Policy
 from handeye.planning.policies.next_best_view import NextBestView
+from handeye.planning.prospect import OutOfReach
 from handeye.planning.stopping import NumberOfViews, StopRule
 from handeye.planning.touch import TouchAccuracy, touch_criterion
 from handeye.session.request import Requested
@@ -40,6 +41,8 @@ class Wish:
         What is seen and touched.
     refine
         Climb from the best candidates to better ones near them, rather than take the best that was drawn.
+    anyway
+        Go on to the most views although the accuracy asked for is out of reach.
     accuracy_px
         Where the views teach the camera too: how well, see `Requested`. None for a calibrated camera.
 
@@ -60,6 +63,7 @@ class Wish:
     joints_err: bool = True
     refine: bool = True
     policy: Policy = field(default_factory=NextBestView)
+    anyway: bool = False
     accuracy_px: float | None = None
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
@@ -78,7 +82,11 @@ class Wish:
             return TouchAccuracy(self.work, self.touch_mm), number
         if self.accuracy_mm is None or self.accuracy_deg is None:
             return (number,)
-        return Requested(self.accuracy_mm, self.accuracy_deg, self.accuracy_px), number
+        asked = Requested(self.accuracy_mm, self.accuracy_deg, self.accuracy_px)
+        # A camera that the views teach is rough at first in a way that soon passes.
+        if self.anyway or self.accuracy_px is not None:
+            return asked, number
+        return asked, OutOfReach(self.accuracy_mm, self.accuracy_deg), number
 
     def criterion(self, estimate: Estimate, measurements: Measurements) -> _core.Criterion:
         """Return what a view is worth now: what it takes off the touch error, where that is asked for."""

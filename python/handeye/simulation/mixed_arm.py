@@ -57,7 +57,11 @@ class MixedArm:
                 "pose_deg": (0.0005, 0.01),
             }
             levels = {name: log_uniform(random, range_) for name, range_ in bounds.items()}
-        levels = {name: factor * value for name, value in levels.items()}
+        return cls.of_levels(random, arm, {name: factor * value for name, value in levels.items()})
+
+    @classmethod
+    def of_levels(cls, random: np.random.Generator, arm: Arm, levels: dict[str, float]) -> "MixedArm":
+        """Draw an arm of these levels."""
         offsets = float(np.deg2rad(levels["offset_deg"])) * random.standard_normal(len(arm))
         offsets[[0, -1]] = 0.0
         twist_rad = float(np.deg2rad(levels["twist_deg"]))

@@ -11,7 +11,6 @@ from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
 from handeye.robots import Arm
-from handeye.robots.frames import frames_of
 from handeye.types import Camera, Pose, Target
 from handeye.types.arrays import FloatArray
 
@@ -45,7 +44,7 @@ def draw_floor(axis: Axes, eye: Eye, low: FloatArray, high: FloatArray, step_m: 
 
 def draw_arm(axis: Axes, eye: Eye, arm: Arm, joints: Sequence[float], *, alpha: float = 1.0) -> None:
     """Draw an arm as thick lines between its joints."""
-    frames = frames_of(arm, np.array([joints]))[0]
+    frames = arm.frames(np.array(joints))
     places = eye(frames[:, :3, 3])
     width = 11.0 if alpha == 1 else 7.0
     _line(axis, places, color=_LINK, linewidth=width, alpha=alpha, solid_capstyle="round",

@@ -20,7 +20,6 @@ from handeye.planning.prediction import Sight, gains
 from handeye.studies.measured_cell import MeasuredCell, measured_cell
 from handeye.studies.policies import ARMS, start_of
 from handeye.types import Mounting
-from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
 from handeye.validation import metrics
 
@@ -31,7 +30,7 @@ QUANTITIES = ("log_translation", "log_rotation", "log_error", "rmse_px")
 HELD_OUT_STEP = 1000
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class GainScatter:
     """One start: gains of its candidates, and what each brought in every draw.
 
@@ -44,12 +43,12 @@ class GainScatter:
         the mean of the two; and the RMSE on held-out views, px.
     """
 
-    gains: dict[str, FloatArray]
-    reductions: dict[str, FloatArray]
+    gains: dict[str, tuple[float, ...]]
+    reductions: dict[str, tuple[tuple[float, ...], ...]]
 
     def correlations(self, criterion: str, quantity: str) -> tuple[float, float]:
         """Pearson's correlation of the gain with the mean over the draws, and the mean of that with each."""
-        predicted, found = self.gains[criterion], self.reductions[quantity]
+        predicted, found = np.array(self.gains[criterion]), np.array(self.reductions[quantity])
         expected = float(np.corrcoef(predicted, found.mean(axis=1))[0, 1])
         single = [float(np.corrcoef(predicted, column)[0, 1]) for column in found.T]
         return expected, float(np.mean(single))
@@ -168,7 +167,11 @@ def _run(job: _Job) -> GainScatter:
                 after = first
             for quantity, value in after.items():
                 reductions[quantity][k, draw] = first[quantity] - value
-    return GainScatter(predicted, reductions)
+    # Plain numbers, which a checkpoint keeps.
+    return GainScatter(
+        {name: tuple(gains.tolist()) for name, gains in predicted.items()},
+        {name: tuple(map(tuple, found.tolist())) for name, found in reductions.items()},
+    )
 
 
 def _taken(cell: MeasuredCell, candidates: Sequence[Candidate], draw: int) -> Measurements:

@@ -82,10 +82,11 @@ class MeasuredCell:
         return [
             Candidate(f"lattice_{k:02d}", Pose(flange[k]), tuple(joints[k].tolist()))
             for k in range(len(seen))
-            if reached[k] and self._shows(seen[k])
+            if reached[k] and self.shows(seen[k])
         ]
 
-    def _shows(self, T_camera_target: FloatArray) -> bool:
+    def shows(self, T_camera_target: FloatArray) -> bool:
+        """Tell whether the whole target is in the image at `T_camera_target` (4, 4)."""
         points = self.recording.target.points @ T_camera_target[:3, :3].T + T_camera_target[:3, 3]
         camera = self.true_camera
         pixels, seen = _core.project(camera.lens, camera.parameters, points)

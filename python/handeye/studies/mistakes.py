@@ -3,29 +3,35 @@
 A mistake is named right if the first finding has its code and, where it concerns single views, exactly these
 views. An answer is wrong if the region stated at 95 % misses the truth, though that of the same recording
 without the mistake holds it. A repair brings the answer back if it moves the camera's centre by less than the
-stated radius of the clean answer. The truth of a set without any is the answer of all its views.
+stated radius of the clean answer. The truth of a set without any is the answer of all its views. Sets are
+taken both ways round: with every pose inverted the other mounting has made the same views.
 """
 
 import zlib
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from handeye.compute.parallel import Progress, Workers, run_all
-from handeye.errors import HandeyeError
-from handeye.estimation import solve
+from handeye.errors import DegenerateError, HandeyeError
+from handeye.estimation import calibrate_examined, solve
 from handeye.estimation.confidence import within
-from handeye.estimation.faults import CODES, diagnose
+from handeye.estimation.faults import CODES, Diagnosis, diagnose
 from handeye.studies.planted import EXPECTED, Mistake, can_be_planted, made_up, plant
-from handeye.types import Pose, Recording
+from handeye.types import Mounting, Pose, Recording
 from handeye.types.calibration import Calibration, ModelName
 from handeye.validation import metrics
 
 RUNS_PER_PIECE = 4
-# Views of a set that a run draws.
+# Views of a set that a run draws, again where they leave a direction open.
 FEWEST, MOST = 8, 20
+MOST_DRAWS = 20
+# Metres, pixels and elements of rotations that differ by less are rounded.
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,7 @@ class Run:
     is of a kind that nobody can put right. Errors are NaN where the recording was refused.
     """
 
+    number: int
     recording: str
     said: str
     named: bool
@@ -66,6 +73,12 @@ class Mistakes:
             "recordings": list(self.recordings),
             "kinds": {kind.value: _kind(runs) for kind, runs in self.kinds.items() if runs},
             "planted": _kind(planted),
+            "missed": [
+                {"kind": kind.value, "trial": run.number, "recording": run.recording, "said": run.said}
+                for kind, runs in self.kinds.items()
+                for run in runs
+                if not run.named or run.wrong or run.restored is False
+            ],
             "clean": {
                 "trials": len(self.clean),
                 "false_alarms": float(np.mean([not run.named for run in self.clean])),
@@ -159,42 +172,59 @@ def _run(job: _Job) -> list[Run | None]:
 def _one(job: _Job, number: int) -> Run | None:
     mistake = "" if job.mistake is None else job.mistake.value
     random = np.random.default_rng([job.seed, number, zlib.crc32(mistake.encode())])
-    clean, X_true = _clean(job, number, random)
     if job.mistake is None:
+        clean, _ = _clean(job, number, random)
         findings = diagnose(clean).findings
         said = next((finding.code for finding in findings if finding.code in CODES), "")
-        return Run(clean.name, said, not said, answered=not said, wrong=False, restored=None, **_NO_ERRORS)
-    if not can_be_planted(clean, job.mistake):
-        return None
-    recording, views = plant(clean, job.mistake, random)
-    before = solve(clean, job.model)
+        nothing = {"translation_mm": float("nan"), "clean_translation_mm": float("nan")}
+        return Run(number, clean.name, said, not said, not said, wrong=False, restored=None, **nothing)
+    for _ in range(MOST_DRAWS):
+        clean, X_true = _clean(job, number, random)
+        if not can_be_planted(clean, job.mistake):
+            return None
+        with suppress(DegenerateError):
+            return _planted(_Clean(clean, X_true, job.model), job.mistake, number, random)
+    raise DegenerateError(f"recording {number}: its views never determine an answer")
+
+
+class _Clean:
+    """A clean recording, its true X, and the answer to it once that is asked for."""
+
+    def __init__(self, recording: Recording, X_true: Pose, model: ModelName) -> None:
+        self.recording, self.X_true, self.model = recording, X_true, model
+
+    @cached_property
+    def answer(self) -> Calibration:
+        return solve(self.recording, self.model)
+
+
+def _planted(clean: _Clean, mistake: Mistake, number: int, random: np.random.Generator) -> Run:
+    recording, views = plant(clean.recording, mistake, random)
     diagnosis = diagnose(recording)
     first = diagnosis.findings[0] if diagnosis.findings else None
-    after = _answer(recording, job.model)
+    after = _answer(diagnosis, clean.model)
     if first is None and isinstance(after, HandeyeError):
         said, concerned = after.code, []
     else:
         said = "" if first is None else first.code
         concerned = [] if first is None else sorted(first.evidence["views"])
-    named = said == EXPECTED[job.mistake] and (not views or concerned == sorted(views))
+    named = said == EXPECTED[mistake] and (not views or concerned == sorted(views))
+    if not named:
+        _ = clean.answer  # what determines nothing without a mistake counts for nothing
     restored = None
     if diagnosis.repaired is not None and diagnosis.findings:
-        restored = _is_restored(diagnosis.repaired, before, job.model)
-    answered = isinstance(after, Calibration)
-    wrong = isinstance(after, Calibration) and _holds(before, X_true) and not _holds(after, X_true)
-    return Run(
-        clean.name,
-        said,
-        named,
-        answered,
-        wrong,
-        restored,
-        metrics.absolute_error(after.X, X_true).translation_mm if isinstance(after, Calibration) else np.nan,
-        metrics.absolute_error(before.X, X_true).translation_mm,
+        restored = _is_restored(diagnosis.repaired, clean)
+    run = Run(number, clean.recording.name, said, named, False, False, restored, np.nan, np.nan)
+    if not isinstance(after, Calibration):
+        return run
+    before, X_true = clean.answer, clean.X_true
+    return replace(
+        run,
+        answered=True,
+        wrong=_holds(before, X_true) and not _holds(after, X_true),
+        translation_mm=metrics.absolute_error(after.X, X_true).translation_mm,
+        clean_translation_mm=metrics.absolute_error(before.X, X_true).translation_mm,
     )
-
-
-_NO_ERRORS = {"translation_mm": float("nan"), "clean_translation_mm": float("nan")}
 
 
 def _clean(job: _Job, number: int, random: np.random.Generator) -> tuple[Recording, Pose]:
@@ -205,16 +235,35 @@ def _clean(job: _Job, number: int, random: np.random.Generator) -> tuple[Recordi
         recording = made_up(4 * round_ + 2 * turn + round_ % 2, job.seed)
         return recording, _reference(recording)
     base = job.bases[turn - 2]
-    most = min(MOST, len(base.recording))
+    recording = _part(base.recording, random)
+    return (_other_way_round(recording) if round_ % 2 else recording), base.X
+
+
+def _part(recording: Recording, random: np.random.Generator) -> Recording:
+    """Return some of the views, in their order."""
+    most = min(MOST, len(recording))
     count = int(random.integers(min(FEWEST, most), most + 1))
-    chosen = np.sort(random.permutation(len(base.recording))[:count])
-    views = [base.recording.views[int(k)] for k in chosen]
-    return replace(base.recording, views=tuple(views)), base.X
+    chosen = np.sort(random.permutation(len(recording))[:count])
+    return recording.with_views([recording.views[int(k)] for k in chosen])
 
 
-def _answer(recording: Recording, model: ModelName) -> Calibration | HandeyeError:
+def _other_way_round(recording: Recording) -> Recording:
+    """Return the same views as the other mounting has them, base and flange exchanged: X and Y stay."""
+    other = next(mounting for mounting in Mounting if mounting is not recording.mounting)
+    views = [
+        replace(view, T_base_flange=view.T_base_flange.inverse(), joints_rad=None) for view in recording.views
+    ]
+    return replace(recording, mounting=other, views=tuple(views))
+
+
+def _answer(diagnosis: Diagnosis, model: ModelName) -> Calibration | HandeyeError:
+    """Return what `solve` says of the recording."""
+    if diagnosis.refused is not None:
+        return diagnosis.refused
+    if diagnosis.examination is None:
+        raise AssertionError  # refused then
     try:
-        return solve(recording, model)
+        return calibrate_examined(diagnosis.examination, model)
     except HandeyeError as error:
         return error
 
@@ -224,9 +273,28 @@ def _holds(calibration: Calibration, X_true: Pose) -> bool:
     return metrics.region_holds(squared, calibration.degrees_of_freedom)
 
 
-def _is_restored(repaired: Recording, clean: Calibration, model: ModelName) -> bool:
-    calibration = _answer(repaired, model)
-    if not isinstance(calibration, Calibration):
+def _is_restored(repaired: Recording, clean: _Clean) -> bool:
+    if _same(repaired, clean.recording):
+        return True
+    try:
+        calibration = solve(repaired, clean.model)
+    except HandeyeError:
         return False
-    radius = within(clean.covariance, clean.degrees_of_freedom).translation_mm
-    return metrics.absolute_error(calibration.X, clean.X).translation_mm < radius
+    expected = clean.answer
+    radius = within(expected.covariance, expected.degrees_of_freedom).translation_mm
+    return metrics.absolute_error(calibration.X, expected.X).translation_mm < radius
+
+
+def _same(one: Recording, other: Recording) -> bool:
+    """Tell whether two recordings are the same but for rounding."""
+    alike = one.mounting is other.mounting and one.target == other.target and len(one) == len(other)
+    return (
+        alike
+        and np.array_equal(one.camera.parameters, other.camera.parameters)
+        and all(
+            np.allclose(a.T_base_flange.matrix, b.T_base_flange.matrix, rtol=0, atol=SAME)
+            and np.array_equal(a.point_ids, b.point_ids)
+            and np.allclose(a.pixels, b.pixels, rtol=0, atol=SAME)
+            for a, b in zip(one.views, other.views, strict=True)
+        )
+    )

@@ -11,8 +11,8 @@ import numpy as np
 
 from handeye.errors import InputError
 from handeye.estimation.faults.kinds.mirrored_pictures import flipped
+from handeye.estimation.faults.kinds.numbers import Numbers
 from handeye.estimation.faults.kinds.sheared_pictures import sheared
-from handeye.estimation.faults.kinds.wrong_rotation import Numbers
 from handeye.estimation.faults.kinds.wrong_unit import larger
 from handeye.estimation.faults.relabel import reflections, turns
 from handeye.notations import NOTATIONS
@@ -41,7 +41,7 @@ class Mistake(StrEnum):
     WRONG_DIRECTION = "wrong_direction"
     """Robot poses inverted, or the other mounting given."""
     WRONG_ROTATION = "wrong_rotation"
-    """Rotations written in one notation and read in another, transposed, or with wrong signs."""
+    """Rotations in another notation or order, transposed, with wrong signs, or in a left-handed frame."""
     MIRRORED = "mirrored"
     """Pictures flipped left to right or upside down."""
     BOARD_SIZE = "board_size"
@@ -101,6 +101,8 @@ GROSS_MM, GROSS_DEG = (40.0, 300.0), (4.0, 40.0)
 MIXED_UP = (
     ("kuka", "ur"),
     ("ur", "kuka"),
+    ("rotation_vector_deg", "fanuc"),
+    ("fanuc", "rotation_vector_deg"),
     ("kuka", "fanuc"),
     ("fanuc", "kuka"),
     ("doosan", "fanuc"),
@@ -183,8 +185,9 @@ def _wrong_unit(recording: Recording, random: np.random.Generator) -> tuple[Reco
     if what < 0.25:
         return replace(recording, target=larger(recording.target, MM_PER_M)), []
     if what < 0.5:
+        factor = np.deg2rad(1.0) if random.uniform() < 0.5 else np.rad2deg(1.0)
         return recording.with_views(
-            _at(v, _degrees_for_radians(v.T_base_flange)) for v in recording.views
+            _at(v, _turned_more(v.T_base_flange, factor)) for v in recording.views
         ), []
     per_metre = (MM_PER_M, MM_PER_M, 100.0, 1 / 0.0254)[int(random.integers(4))]
     return recording.with_views(_at(v, _in_unit(v.T_base_flange, per_metre)) for v in recording.views), []
@@ -201,12 +204,19 @@ def _wrong_direction(recording: Recording, random: np.random.Generator) -> tuple
 def _wrong_rotation(recording: Recording, random: np.random.Generator) -> tuple[Recording, list[str]]:
     poses = np.array([view.T_base_flange.matrix for view in recording.views])
     what = random.uniform()
-    if what < 0.15:
+    if what < 0.1:
         changed = poses.copy()
         changed[:, :3, :3] = np.swapaxes(poses[:, :3, :3], 1, 2)
-    elif what < 0.3:
-        given = NOTATIONS["fanuc"]
-        changed = Numbers(given).read_as(poses, meant=given, factors=(-1.0, -1.0, -1.0))
+    elif what < 0.2:
+        changed = _reordered(poses, real_first=bool(random.integers(2)))
+    elif what < 0.4:
+        given = NOTATIONS[("kuka", "fanuc", "staubli")[int(random.integers(3))]]
+        signs = ((-1.0, -1.0, -1.0), (-1.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, -1.0))
+        changed = Numbers(given).read_as(poses, meant=given, factors=signs[int(random.integers(4))])
+    elif what < 0.5:
+        mirror = np.ones(4)
+        mirror[int(random.integers(3))] = -1
+        changed = poses * np.outer(mirror, mirror)
     else:
         written, read = MIXED_UP[int(random.integers(len(MIXED_UP)))]
         changed = Numbers(NOTATIONS[written]).read_as(poses, meant=NOTATIONS[read])
@@ -407,9 +417,17 @@ def _in_unit(pose: Pose, per_metre: float) -> Pose:
     return Pose(matrix)
 
 
-def _degrees_for_radians(pose: Pose) -> Pose:
-    """Return what comes out where a rotation vector in radians is read as degrees."""
-    vector = np.deg2rad(pose.log()[3:])
-    matrix = Pose.exp([0, 0, 0, *vector]).matrix.copy()
+def _turned_more(pose: Pose, factor: float) -> Pose:
+    """Return what comes out where the unit of a rotation vector is mistaken."""
+    matrix = Pose.exp([0, 0, 0, *(factor * pose.log()[3:])]).matrix.copy()
     matrix[:3, 3] = pose.translation
     return Pose(matrix)
+
+
+def _reordered(poses: FloatArray, *, real_first: bool) -> FloatArray:
+    """Return poses (K, 4, 4) whose quaternions were written in one order and read in the other."""
+    changed = poses.copy()
+    for matrix, pose in zip(changed, poses, strict=True):
+        quaternion = np.roll(Pose(pose).quaternion_xyzw, 1 if real_first else -1)
+        matrix[:3, :3] = Pose.from_quaternion([0, 0, 0], quaternion).rotation
+    return changed

@@ -78,6 +78,7 @@ class CellResult:
     as_reported_mm: float
     entropy_mm: float = float("nan")
     touch_mm: float = float("nan")
+    pool_mm: float = float("nan")
     asked_held: float = float("nan")
     asked_met: bool = False
     asked_views: int = 0
@@ -139,6 +140,7 @@ def _summed(results: Sequence[CellResult]) -> dict[str, Any]:
         "as_reported_mm": mean("as_reported_mm"),
         "planned_by_entropy_mm": mean("entropy_mm"),
         "planned_by_touch_mm": mean("touch_mm"),
+        "whole_pool_mm": mean("pool_mm"),
         "asked_met": len(met),
         "asked_held": float(np.mean([result.asked_held for result in met])) if met else float("nan"),
         "asked_views": float(np.mean([result.asked_views for result in met])) if met else float("nan"),
@@ -332,6 +334,12 @@ def _planned(job: _Job, kind: ErrorKind, result: CellResult) -> CellResult:
                     stopped = estimate, count
                 if count >= options.views and stopped is not None:
                     break
+    # What no choice of views out of the pool could go far below: all of them.
+    everything = Measurements.of_recording(simulated.recording)
+    whole = make_estimator(ModelName.AUTO, _arm(job.group))(everything)
+    random = np.random.default_rng([options.seed, 8, job.number])
+    errors, _ = touched(random, simulated, whole, work, options.touches)
+    pool_mm = MM_PER_M * float(errors.mean())
     kept, views = float("nan"), 0
     if stopped is not None:
         random = np.random.default_rng([options.seed, 9, job.number])
@@ -341,6 +349,7 @@ def _planned(job: _Job, kind: ErrorKind, result: CellResult) -> CellResult:
         result,
         entropy_mm=means["entropy"],
         touch_mm=means["touch"],
+        pool_mm=pool_mm,
         asked_held=kept,
         asked_met=stopped is not None,
         asked_views=views,

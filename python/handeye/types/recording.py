@@ -41,6 +41,11 @@ class Truth:
     ------
     InputError
         Neither X nor Y.
+
+    Examples
+    --------
+    >>> Truth(X=Pose.identity()).to_dict()["X"][0]
+    [1.0, 0.0, 0.0, 0.0]
     """
 
     X: Pose | None = None

@@ -24,7 +24,13 @@ CAMERA, TARGET = "camera", "target"
 
 
 class Body(StrEnum):
-    """What a camera or a target is fixed to."""
+    """What a camera or a target is fixed to.
+
+    Examples
+    --------
+    >>> Body("flange").value
+    'flange'
+    """
 
     FLANGE = "flange"
     BASE = "base"
@@ -33,7 +39,13 @@ class Body(StrEnum):
 
 @dataclass(frozen=True)
 class MountedCamera:
-    """A camera and what it is fixed to."""
+    """A camera and what it is fixed to.
+
+    Examples
+    --------
+    >>> MountedCamera(Camera("pinhole", [800, 800, 320, 240], 640, 480), Body.FLANGE).mounting.value
+    'eye_in_hand'
+    """
 
     camera: Camera
     body: Body
@@ -46,7 +58,13 @@ class MountedCamera:
 
 @dataclass(frozen=True)
 class MountedTarget:
-    """A target and what it is fixed to."""
+    """A target and what it is fixed to.
+
+    Examples
+    --------
+    >>> MountedTarget(Chessboard(6, 9, 0.025), Body.BASE).pose_name
+    'T_base_target'
+    """
 
     target: Target
     body: Body
@@ -59,7 +77,14 @@ class MountedTarget:
 
 @dataclass(frozen=True)
 class CameraView:
-    """What one camera saw of one target at a station; the view bears the station's name."""
+    """What one camera saw of one target at a station; the view bears the station's name.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [9.0, 9.0]])  # pixels
+    >>> CameraView("left", "table", View("stop_1", Pose.identity(), np.arange(4), corners)).camera
+    'left'
+    """
 
     camera: str
     target: str
@@ -74,6 +99,13 @@ class Station:
     ------
     InputError
         No view, a camera that saw a target twice, or views that differ in name, robot pose, joints or time.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [9.0, 9.0]])  # pixels
+    >>> view = View("stop_1", Pose.identity(), np.arange(4), corners)
+    >>> Station((CameraView("left", "table", view), CameraView("right", "table", view))).name
+    'stop_1'
     """
 
     views: tuple[CameraView, ...]
@@ -117,7 +149,13 @@ class Station:
 
 @dataclass(frozen=True)
 class RigTruth:
-    """What is known to be true, by name: `T_camera_flange` or `T_camera_base`, and Y of targets."""
+    """What is known to be true, by name: `T_camera_flange` or `T_camera_base`, and Y of targets.
+
+    Examples
+    --------
+    >>> list(RigTruth(cameras={"left": Pose.identity()}).cameras)
+    ['left']
+    """
 
     cameras: Mapping[str, Pose] = field(default_factory=dict[str, Pose])
     targets: Mapping[str, Pose] = field(default_factory=dict[str, Pose])

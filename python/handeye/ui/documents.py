@@ -9,19 +9,21 @@ import numpy as np
 from handeye import _core
 from handeye.cameras.protocol import Grey
 from handeye.detection import Detection
+from handeye.errors import DegenerateError
 from handeye.estimation import Estimate, Measurements
 from handeye.estimation.confidence import ellipsoid
 from handeye.estimation.estimate import corrected
+from handeye.planning.limits import NOTHING, limits
 from handeye.robots import Arm
-from handeye.robots.frames import frames_of
 from handeye.robots.protocol import Goal, Reading
 from handeye.session.deciding import Considered
 from handeye.types import Camera, Mounting, Pose, Target, View
 from handeye.types.arrays import FloatArray, IndexArray
-from handeye.types.calibration import MM_PER_M
+from handeye.types.calibration import MM_PER_M, ModelName
 
-# How large the longest axis of an ellipsoid is drawn, and an arrow of the usual residual.
-DRAWN_M, DRAWN_PX = 0.06, 30.0
+# How large the longest half axis of an ellipsoid is drawn, as a part of how far apart the views are but at
+# least of the other, and an arrow of the usual residual.
+DRAWN, LEAST_M, DRAWN_PX = 0.07, 0.8, 30.0
 # Cells of the picture in which points are counted.
 _COVERAGE = (8, 6)
 
@@ -51,6 +53,8 @@ class Shown:
         Views, and the 95 % radii in mm and deg that were stated after so many.
     gains
         Views, the gain predicted for the one that was taken then, and the gain that it brought.
+    planned
+        As `known`, had the views been taken in the order of planning.
     """
 
     mounting: Mounting
@@ -68,30 +72,34 @@ class Shown:
     gains: tuple[tuple[int, float, float | None], ...] = ()
     asked: tuple[float, float] | None = None
     rejected: dict[str, str] = field(default_factory=dict[str, str])
+    planned: tuple[tuple[int, float, float], ...] = ()
+
+    @property
+    def at(self) -> Pose | None:
+        """Where the flange is, or was at the last view; None if nobody knows."""
+        if self.standing is not None:
+            return self.standing.T_base_flange
+        return self.views[-1].T_base_flange if self.views else None
 
 
 def scene(shown: Shown) -> dict[str, Any]:
     """Return what stands where, in the frame of the robot's base, metres."""
-    estimate, standing = shown.estimate, shown.standing
-    at = None if standing is None else standing.T_base_flange
-    if at is None and shown.views:
-        at = shown.views[-1].T_base_flange
+    estimate, standing, at = shown.estimate, shown.standing, shown.at
+    seen = _sight(shown)
     return {
-        "mounting": shown.mounting.value,
         "arm": _frames(shown.arm, None if standing is None else standing.joints_rad),
         "ghost": _frames(shown.arm, None if shown.goal is None else shown.goal.joints_rad),
         "flange": None if at is None else _flat(at.matrix),
         "boards": _boards(shown, at),
         "cameras": _cameras(shown, at),
         "views": [
-            {"name": view.name, "pose": _flat(pose)}
+            {"name": view.name, "pose": _flat(pose), "sight": seen}
             for view, pose in zip(shown.views, _moving(shown, _poses(shown.views)), strict=True)
         ],
         "goal": None
         if shown.goal is None
-        else _flat(_moving(shown, shown.goal.T_base_flange.matrix[None])[0]),
+        else {"pose": _flat(_moving(shown, shown.goal.T_base_flange.matrix[None])[0]), "sight": seen},
         "ellipsoids": [] if estimate is None or at is None else _ellipsoids(shown, estimate, at),
-        "opening": _opening(shown.camera),
     }
 
 
@@ -99,7 +107,8 @@ def candidates(shown: Shown) -> dict[str, Any]:
     """Return where the camera, or the target, could go, with the gain of each or why it may not."""
     considered = shown.considered
     if considered is None:
-        return {"poses": [], "gains": [], "names": [], "chosen": None, "ruled_out": [], "reasons": []}
+        nothing: dict[str, Any] = {name: [] for name in ("poses", "gains", "names", "ruled_out", "reasons")}
+        return nothing | {"chosen": None, "sight": None}
     pool = considered.pool
     poses = np.array([c.T_base_flange.matrix for c in pool.candidates]).reshape(-1, 4, 4)
     reasons = sorted(set(considered.reasons))
@@ -111,28 +120,46 @@ def candidates(shown: Shown) -> dict[str, Any]:
         "ruled_out": _many(_moving(shown, considered.ruled_out)),
         "reason_of": [reasons.index(reason) for reason in considered.reasons],
         "reasons": reasons,
+        "sight": _sight(shown),
     }
 
 
 def knowledge(shown: Shown) -> dict[str, Any]:
     """Return the curves of what was stated and asked, gains, and what limits the accuracy now."""
     estimate = shown.estimate
-    now = None if estimate is None or not estimate.determined else estimate.within_95.to_dict()
-    shares: list[dict[str, Any]] = []
+    now: list[dict[str, Any]] = []
     sentence = None
     if estimate is not None:
-        noise = estimate.noise
-        shares = [{"name": name, "share": share} for name, share in noise.evidence.items() if share > 0.005]
         sentence = None if estimate.attribution is None else estimate.attribution.sentence
+        if estimate.determined:
+            now = [{"name": None, **estimate.within_95.to_dict()}]
+    curves = [curve_of(None, shown.known), *([curve_of("planned", shown.planned)] if shown.planned else [])]
     return {
         "now": now,
         "asked": None if shown.asked is None else dict(zip(("mm", "deg"), shown.asked, strict=True)),
-        "curve": [{"views": n, "mm": mm, "deg": deg} for n, mm, deg in shown.known],
+        "curves": curves,
         "gains": [{"views": n, "predicted": p, "realised": r} for n, p, r in shown.gains],
-        "shares": shares,
+        "shares": shares_of(shown),
         "sentence": sentence,
         "open": [] if estimate is None else [direction.sentence for direction in estimate.unobservable],
     }
+
+
+def curve_of(name: str | None, known: Sequence[tuple[int, float, float]]) -> dict[str, Any]:
+    """Return a curve: what was stated after each number of views."""
+    return {"name": name, "points": [{"views": n, "mm": mm, "deg": deg} for n, mm, deg in known]}
+
+
+def shares_of(shown: Shown) -> list[dict[str, Any]]:
+    """Return the share of each source of error in the variance of the answer, the largest first."""
+    estimate = shown.estimate
+    if estimate is None or estimate.model is not ModelName.AUTO:
+        return []
+    try:
+        found = limits(estimate, _measured(shown))
+    except DegenerateError:
+        return []
+    return [{"name": name, "share": share} for name, share in found.items() if share > NOTHING]
 
 
 def views(shown: Shown) -> dict[str, Any]:
@@ -149,7 +176,7 @@ def views(shown: Shown) -> dict[str, Any]:
         rmse = None if off is None or len(off) == 0 else float(np.sqrt(np.square(off).sum(axis=1).mean()))
         rows.append({"name": view.name, "points": len(view), "rmse_px": rmse})
     rejected = [{"name": name, "why": why} for name, why in shown.rejected.items()]
-    return {"views": rows, "rejected": rejected, "coverage": counts.tolist(), "size": [width, height]}
+    return {"views": rows, "rejected": rejected, "coverage": [{"name": None, "cells": counts.tolist()}]}
 
 
 def picture(shown: Shown) -> dict[str, Any] | None:
@@ -248,7 +275,12 @@ def _cameras(shown: Shown, at: Pose | None) -> list[dict[str, Any]]:
         if at is None:
             return []
         pose = at @ pose
-    return [{"name": "camera", "pose": _flat(pose.matrix)}]
+    return [{"name": "camera", "pose": _flat(pose.matrix), "sight": _opening(shown.camera)}]
+
+
+def _sight(shown: Shown) -> list[float] | None:
+    """How wide what moves with the flange sees, if that is a camera; None for a target."""
+    return _opening(shown.camera) if shown.mounting is Mounting.EYE_IN_HAND else None
 
 
 def _opening(camera: Camera) -> list[float]:
@@ -268,12 +300,14 @@ def _ellipsoids(shown: Shown, estimate: Estimate, at: Pose) -> list[dict[str, An
     T_base_camera = at @ estimate.X.inverse() if in_hand else estimate.X.inverse()
     aim = T_camera_target.act(shown.target.points.mean(axis=0, keepdims=True))[0]
     covariance = estimate.hand_eye_covariance
+    apart = np.ptp(_poses(shown.views)[:, :3, 3], axis=0).max() if shown.views else 0.0
+    drawn_m = DRAWN * max(float(apart), LEAST_M)
     found: list[dict[str, Any]] = []
     for name, point in (("camera", np.zeros(3)), ("a point at the target", aim)):
         x, y, z = point
         jacobian = np.hstack([np.eye(3), -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])])
         region = ellipsoid(jacobian @ covariance @ jacobian.T, estimate.degrees_of_freedom)
-        factor = round_factor(DRAWN_M / max(float(region.semi_axes_m[0]), 1e-9))
+        factor = round_factor(drawn_m / max(float(region.semi_axes_m[0]), 1e-9))
         axes = (T_base_camera.rotation @ region.directions.T).T * region.semi_axes_m[:, np.newaxis] * factor
         found.append(
             {
@@ -292,8 +326,11 @@ def _put_right(shown: Shown) -> tuple[View, ...]:
     estimate = shown.estimate
     if estimate is None or not shown.views:
         return shown.views
-    measurements = Measurements(shown.mounting, shown.camera, shown.target, shown.views, ())
-    return corrected(measurements, estimate.kinematics, estimate.arm_correction).views
+    return corrected(_measured(shown), estimate.kinematics, estimate.arm_correction).views
+
+
+def _measured(shown: Shown) -> Measurements:
+    return Measurements(shown.mounting, shown.camera, shown.target, shown.views, ())
 
 
 def _corrected_pose(shown: Shown, T_base_flange: Pose) -> Pose:
@@ -327,7 +364,7 @@ def _residuals(
 def _frames(arm: Arm | None, joints: Sequence[float] | None) -> list[list[float]] | None:
     if arm is None or joints is None or len(joints) != len(arm):
         return None
-    return _many(frames_of(arm, np.array(joints)[np.newaxis])[0])
+    return _many(arm.frames(np.array(joints)))
 
 
 def _listed(pixels: FloatArray) -> list[list[float]]:

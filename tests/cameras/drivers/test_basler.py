@@ -10,6 +10,7 @@ import pytest
 
 from handeye.cameras.drivers.basler import BaslerCamera
 from handeye.cameras.protocol import ImageSource
+from handeye.cameras.several import SeveralCameras
 from handeye.errors import DeviceError
 from handeye.testing import CameraTests
 
@@ -84,9 +85,12 @@ def test_colours_and_more_bits_become_grey(camera: BaslerCamera) -> None:
 
 def test_two_cameras_at_one_stop(camera: ImageSource) -> None:
     other = BaslerCamera(OTHER)
-    shapes = {one.grab("view_01.1").image.shape for one in (camera, other)}  # type: ignore[union-attr]
+    rig = SeveralCameras({"left": camera, "right": other})
+    shapes = {name: eye.grab("station_01.1").image.shape for name, eye in rig.eyes().items()}  # type: ignore[union-attr]
+    rig.close()
     other._close()
-    assert len(shapes) == 2
+    assert shapes["left"] == (240, 320)
+    assert shapes["right"] != (240, 320)
 
 
 @pytest.mark.parametrize("address", ["", "40012345", f"{ONE},missing.pfs"])

@@ -1,6 +1,6 @@
 //! What stands in a cell, and what was measured there.
 
-use nalgebra::{DMatrix, DVector, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 
 use super::pose_measurement::PoseMeasurement;
 use crate::error::Error;
@@ -51,6 +51,9 @@ pub struct Station {
     pub velocity: Option<Vector6<f64>>,
     /// Twist per way of displacing a joint on its link, `6 x m`.
     pub links: Option<DMatrix<f64>>,
+    /// Twist per joint and its play, `6 x n`: half of it towards the side that the joint came from. `None` where that
+    /// is not known, or the joints have no play.
+    pub approach: Option<DMatrix<f64>>,
 }
 
 /// One detection of a target in a picture.
@@ -69,6 +72,42 @@ pub struct Measurement {
     pub variance_px2: f64,
 }
 
+/// A point that is not on a board: the tip of a tool in the flange, or a fixed point in the base.
+#[derive(Clone, Debug)]
+pub struct Tip {
+    /// What it is fixed to.
+    pub body: Body,
+    /// Where it is believed to be in its body.
+    pub at: Vector3<f64>,
+    /// How well that is known.
+    pub information: Matrix3<f64>,
+}
+
+/// A point that touches or is touched.
+#[derive(Clone, Copy, Debug)]
+pub enum TouchPoint {
+    /// A point of a target, in its own frame.
+    OfTarget {
+        /// Which target.
+        target: usize,
+        /// Where.
+        at: Vector3<f64>,
+    },
+    /// One of the cell's tips.
+    Tip(usize),
+}
+
+/// Two points that met.
+#[derive(Clone, Debug)]
+pub struct Touch {
+    /// Where the arm stood.
+    pub station: usize,
+    /// The two points, one on the flange and one on the base.
+    pub points: [TouchPoint; 2],
+    /// Covariance of how well they met, in the base.
+    pub covariance: Matrix3<f64>,
+}
+
 /// A cell and what was measured in it.
 #[derive(Clone, Debug)]
 pub struct Cell {
@@ -82,10 +121,15 @@ pub struct Cell {
     pub board_scale: bool,
     /// Detections, by station.
     pub measurements: Vec<Measurement>,
+    /// Points that touches are about beside those of the targets.
+    pub tips: Vec<Tip>,
+    /// Points that met, by station.
+    pub touches: Vec<Touch>,
 }
 
 impl Cell {
-    /// Columns of the parameters: first those of `X` and `Y`, then of the cameras, then scales of the boards.
+    /// Columns of the parameters: first those of `X` and `Y`, then of the cameras, then scales of the boards,
+    /// then tips.
     pub(super) fn columns(&self) -> Columns {
         let poses = 6 * (self.cameras.len() + self.targets.len());
         let mut camera = Vec::with_capacity(self.cameras.len());
@@ -95,12 +139,8 @@ impl Cell {
             next += one.parameters;
         }
         let boards = next;
-        Columns {
-            targets: 6 * self.cameras.len(),
-            camera,
-            boards,
-            end: boards + if self.board_scale { self.targets.len() } else { 0 },
-        }
+        let tips = boards + if self.board_scale { self.targets.len() } else { 0 };
+        Columns { targets: 6 * self.cameras.len(), camera, boards, tips, end: tips + 3 * self.tips.len() }
     }
 
     /// The middle `M` of the chain `X M Y` at a station.
@@ -111,6 +151,11 @@ impl Cell {
             (Body::Base, Body::Flange) => *pose,
             _ => Se3::identity(),
         }
+    }
+
+    /// Whether all poses were measured by detectors of somebody else, without pictures.
+    pub(super) fn is_unseen(&self) -> bool {
+        self.measurements.iter().all(|m| m.pose.is_foreign)
     }
 
     /// # Errors
@@ -152,6 +197,41 @@ impl Cell {
                 return Err(Error::invalid(format!("camera {c}: its prior is not of its parameters")));
             }
         }
+        self.check_touches()
+    }
+
+    /// What a point is fixed to; `None` where there is no such target or tip.
+    pub(super) fn body_of(&self, point: TouchPoint) -> Option<Body> {
+        match point {
+            TouchPoint::OfTarget { target, .. } => self.targets.get(target).copied(),
+            TouchPoint::Tip(tip) => self.tips.get(tip).map(|t| t.body),
+        }
+    }
+
+    /// # Errors
+    /// [`Error::InvalidInput`] naming what does not fit.
+    fn check_touches(&self) -> Result<(), Error> {
+        let seen = self.measurements.iter().map(|m| m.station).max();
+        for (k, touch) in self.touches.iter().enumerate() {
+            let bodies = touch.points.map(|point| self.body_of(point));
+            let mut both = bodies.iter().flatten();
+            if both.next() == both.next() || bodies.contains(&None) {
+                return Err(Error::invalid(format!(
+                    "touch {k}: a point of the flange and one of the base are needed"
+                )));
+            }
+            if touch.station >= self.stations.len() || seen.is_some_and(|last| touch.station <= last) {
+                return Err(Error::invalid(format!(
+                    "touch {k}: its station must come after those of the pictures"
+                )));
+            }
+            if touch.covariance.cholesky().is_none() {
+                return Err(Error::invalid(format!("touch {k}: its covariance is not positive")));
+            }
+        }
+        if !self.touches.is_sorted_by(|a, b| a.station < b.station) {
+            return Err(Error::invalid("touches must come one to a station, in order"));
+        }
         Ok(())
     }
 }
@@ -165,6 +245,8 @@ pub(super) struct Columns {
     pub camera: Vec<usize>,
     /// First of the scales of the boards.
     pub boards: usize,
+    /// First of the tips.
+    pub tips: usize,
     /// One beyond the last.
     pub end: usize,
 }

@@ -29,6 +29,17 @@ pub fn start_of_cell(
     given: Option<(&[Se3], &[Se3])>,
 ) -> Result<CellStart, Error> {
     cell.check()?;
+    if let Some((x, y)) = given
+        && (x.len() != cell.cameras.len() || y.len() != cell.targets.len())
+    {
+        return Err(Error::invalid(format!(
+            "a start of {} cameras and {} targets, expected {} and {}",
+            x.len(),
+            y.len(),
+            cell.cameras.len(),
+            cell.targets.len()
+        )));
+    }
     let mut x: Vec<Option<Se3>> = vec![None; cell.cameras.len()];
     let mut y: Vec<Option<Se3>> = vec![None; cell.targets.len()];
     let mut origin = None;

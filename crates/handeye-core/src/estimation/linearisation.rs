@@ -1,8 +1,8 @@
 //! Chains around a guess: twists between chain and measurement, and how everything moves them.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 
-use super::cell::{Body, Cell};
+use super::cell::{Body, Cell, Columns, Touch, TouchPoint};
 use crate::se3::Se3;
 
 /// The unknown poses.
@@ -26,7 +26,7 @@ impl Guess {
     }
 }
 
-/// One station linearised: six rows per measurement.
+/// One station linearised: six rows per measurement, or three of a touch.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     /// Which station of the cell.
@@ -46,9 +46,9 @@ pub(super) struct Rows {
 /// All stations.
 #[derive(Clone, Debug)]
 pub(super) struct Linearisation {
-    /// Stations with a measurement.
+    /// Stations with a measurement or a touch.
     pub stations: Vec<Rows>,
-    /// What the pixels say of the parameters beside the poses: information and gradient.
+    /// What the pixels say of the parameters beside the poses, and what is known of tips: information and gradient.
     pub information: DMatrix<f64>,
     /// See `information`.
     pub gradient: DVector<f64>,
@@ -109,15 +109,71 @@ pub(super) fn linearise(cell: &Cell, guess: &Guess) -> Linearisation {
         }
         stations.push(rows);
     }
+    stations.extend(cell.touches.iter().map(|touch| rows_of_touch(cell, guess, &columns, touch)));
+    for (i, tip) in cell.tips.iter().enumerate() {
+        let mut known = information.view_mut((columns.tips + 3 * i, columns.tips + 3 * i), (3, 3));
+        known += &tip.information;
+    }
     Linearisation { stations, information, gradient }
 }
 
 /// Columns of a measurement's pixel parameters: those of its camera, then the scale of its board.
-fn pixel_columns(cell: &Cell, camera: usize, target: usize, columns: &super::cell::Columns) -> Vec<usize> {
+fn pixel_columns(cell: &Cell, camera: usize, target: usize, columns: &Columns) -> Vec<usize> {
     let first = columns.camera[camera];
     let mut all: Vec<usize> = (first..first + cell.cameras[camera].parameters).collect();
     if cell.board_scale {
         all.push(columns.boards + target);
     }
     all
+}
+
+/// Where a point is in its body, and the derivative of that in the parameters.
+fn place(point: TouchPoint, cell: &Cell, guess: &Guess, columns: &Columns) -> (Vector3<f64>, DMatrix<f64>) {
+    let mut slope = DMatrix::zeros(3, columns.end);
+    match point {
+        TouchPoint::OfTarget { target, at } => {
+            let y = &guess.y[target];
+            let place = y.act(&at);
+            slope.view_mut((0, columns.targets + 6 * target), (3, 6)).copy_from(&along_twist(&place));
+            if cell.board_scale {
+                slope.view_mut((0, columns.boards + target), (3, 1)).copy_from(&(y.rotation * at));
+            }
+            (place, slope)
+        }
+        TouchPoint::Tip(tip) => {
+            slope.view_mut((0, columns.tips + 3 * tip), (3, 3)).copy_from(&Matrix3::<f64>::identity());
+            (cell.tips[tip].at, slope)
+        }
+    }
+}
+
+/// Derivative of a point `p` in a twist from the left: `[I, -[p]x]`.
+fn along_twist(p: &Vector3<f64>) -> DMatrix<f64> {
+    let mut slope = DMatrix::zeros(3, 6);
+    slope.view_mut((0, 0), (3, 3)).copy_from(&Matrix3::<f64>::identity());
+    slope.view_mut((0, 3), (3, 3)).copy_from(&-p.cross_matrix());
+    slope
+}
+
+/// Linearises one touch: three rows of a station of its own.
+///
+/// With `T` the pose of the arm, `f` the point in the flange and `b` the one in the base, `b - T f` vanishes but for how
+/// well it was touched.
+fn rows_of_touch(cell: &Cell, guess: &Guess, columns: &Columns, touch: &Touch) -> Rows {
+    let pose: Se3 = cell.stations[touch.station].pose;
+    let [one, other] = touch.points;
+    let (on_flange, on_base) =
+        if cell.body_of(one) == Some(Body::Flange) { (one, other) } else { (other, one) };
+    let (f, of_f) = place(on_flange, cell, guess, columns);
+    let (b, of_b) = place(on_base, cell, guess, columns);
+    let carried = pose.act(&f);
+    let rotation = DMatrix::from_column_slice(3, 3, pose.rotation.as_slice());
+    Rows {
+        station: touch.station,
+        e: DVector::from_column_slice((b - carried).as_slice()),
+        b: of_b - &rotation * of_f,
+        pixels: DMatrix::from_column_slice(3, 3, touch.covariance.as_slice()),
+        flange: -(&rotation * along_twist(&f)),
+        base: -along_twist(&carried),
+    }
 }

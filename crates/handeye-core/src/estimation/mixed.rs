@@ -11,13 +11,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::component::Component;
-pub(super) use super::component::{Effect, Term};
-use super::levels::Level;
-use super::linearisation::Linearisation;
+use super::levels::{Level, LevelPrior};
 use super::products::{Accumulate, TOGETHER, Whiten};
 use crate::positive::Factor;
-use crate::simd::{MAX_LANES, VectorUnit, dispatch};
+use crate::simd::{VectorUnit, dispatch};
 
 /// A prior on parameters.
 #[derive(Clone)]
@@ -31,17 +28,10 @@ pub(super) struct Prior {
     pub mean: Option<DVector<f64>>,
     pub recurring: bool,
     /// Of recurring ones: covariances of the stations at a deviation of one.
-    squares: Vec<DMatrix<f64>>,
+    pub squares: Vec<DMatrix<f64>>,
 }
 
 impl Prior {
-    /// Of new parameters with columns of their own, whose place is not known yet.
-    fn of_columns(of: &'static str, levels: Vec<usize>, columns: &[DMatrix<f64>], recurring: bool) -> Self {
-        let count = columns.first().map_or(0, DMatrix::ncols);
-        let squares = if recurring { columns.iter().map(square).collect() } else { vec![] };
-        Self { of, levels, first: 0, count, information: None, mean: None, recurring, squares }
-    }
-
     pub fn range(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.count
     }
@@ -55,13 +45,8 @@ impl Prior {
     }
 }
 
-/// `m m'`.
-fn square(m: &DMatrix<f64>) -> DMatrix<f64> {
-    m * m.transpose()
-}
-
 /// Adds a multiple of a matrix of the same shape.
-fn add(to: &mut DMatrix<f64>, factor: f64, m: &DMatrix<f64>) {
+pub(super) fn add(to: &mut DMatrix<f64>, factor: f64, m: &DMatrix<f64>) {
     for (to, m) in to.as_mut_slice().iter_mut().zip(m.as_slice()) {
         *to += factor * m;
     }
@@ -73,8 +58,10 @@ pub(super) struct Noise {
     pub of: &'static str,
     pub levels: Vec<usize>,
     pub roots: Vec<DMatrix<f64>>,
+    /// Of each root.
+    pub columns: usize,
     /// Their squares: covariances at a deviation of one.
-    squares: Vec<DMatrix<f64>>,
+    pub squares: Vec<DMatrix<f64>>,
 }
 
 /// Rows of all stations in units of their noise.
@@ -91,6 +78,8 @@ pub(super) struct Station {
     pub size: usize,
     /// `[B e]` row by row, padded to whole vectors.
     pub rows: Vec<f64>,
+    /// Roots of all noises side by side, row by row, padded to whole vectors.
+    pub roots: Vec<f64>,
     pub pixels: DMatrix<f64>,
 }
 
@@ -142,105 +131,6 @@ pub(super) struct Evaluation {
 }
 
 impl Mixed {
-    /// A linearised cell with its components; `weak` is information and right side of what is believed of the poses.
-    pub fn new(
-        linearisation: &Linearisation,
-        components: &[Box<dyn Component + '_>],
-        weak: (&DMatrix<f64>, &DVector<f64>),
-        cell: &super::cell::Cell,
-    ) -> Self {
-        let mut levels = Vec::new();
-        let mut owners = Vec::new();
-        let (mut noises, mut priors, mut constants) = (Vec::new(), Vec::new(), Vec::new());
-        let mut blocks: Vec<(Prior, Vec<DMatrix<f64>>)> = Vec::new();
-        for component in components {
-            let first = levels.len();
-            levels.extend(component.levels());
-            owners.push((component.name(), first..levels.len()));
-            for term in component.terms(cell, linearisation) {
-                let of: Vec<usize> = term.levels.iter().map(|l| first + l).collect();
-                match term.effect {
-                    Effect::Noise(roots) => {
-                        let squares = roots.iter().map(square).collect();
-                        noises.push(Noise { of: component.name(), levels: of, roots, squares });
-                    }
-                    Effect::Constant(columns) => {
-                        blocks.push((Prior::of_columns(component.name(), of, &columns, false), columns));
-                    }
-                    Effect::Recurring(columns) => {
-                        blocks.push((Prior::of_columns(component.name(), of, &columns, true), columns));
-                    }
-                    Effect::Prior { first, information, mean } => priors.push(Prior {
-                        of: component.name(),
-                        levels: of,
-                        first,
-                        count: mean.len(),
-                        information: Some(information),
-                        mean: Some(mean),
-                        recurring: false,
-                        squares: vec![],
-                    }),
-                }
-            }
-        }
-        // Recurring parameters come last: the answer does not name them.
-        blocks.sort_by_key(|(prior, _)| prior.recurring);
-        let poses = linearisation.information.nrows();
-        let mut size = poses;
-        let mut told = poses;
-        for (prior, _) in &mut blocks {
-            prior.first = size;
-            constants.push((prior.of, prior.range()));
-            size += prior.count;
-            if !prior.recurring {
-                told = size;
-            }
-        }
-        let width = (size + 1).next_multiple_of(MAX_LANES);
-        let stations = linearisation
-            .stations
-            .iter()
-            .enumerate()
-            .map(|(k, from)| {
-                let rows_of = from.e.len();
-                let mut rows = vec![0.0; rows_of * width];
-                for (r, row) in rows.chunks_exact_mut(width).enumerate() {
-                    for (j, entry) in row[..poses].iter_mut().enumerate() {
-                        *entry = from.b[(r, j)];
-                    }
-                    let mut at = poses;
-                    for (_, columns) in &blocks {
-                        for j in 0..columns[k].ncols() {
-                            row[at] = columns[k][(r, j)];
-                            at += 1;
-                        }
-                    }
-                    row[size] = from.e[r];
-                }
-                Station { size: rows_of, rows, pixels: from.pixels.clone() }
-            })
-            .collect();
-        priors.extend(blocks.into_iter().map(|(prior, _)| prior));
-        let mut given = DMatrix::zeros(size, size);
-        let mut given_right = DVector::zeros(size);
-        given.view_mut((0, 0), (poses, poses)).copy_from(&(&linearisation.information + weak.0));
-        given_right.rows_mut(0, poses).copy_from(&(&linearisation.gradient + weak.1));
-        Self {
-            levels,
-            size,
-            told,
-            components: owners,
-            constants,
-            width,
-            stations,
-            noises,
-            priors,
-            given,
-            given_right,
-            unit: VectorUnit::widest(),
-        }
-    }
-
     /// The same model of some of the stations only; what all pixels say of camera and board stays.
     pub fn among(&self, chosen: &[usize]) -> Self {
         let of = |all: &[DMatrix<f64>]| -> Vec<DMatrix<f64>> {
@@ -293,6 +183,15 @@ impl Mixed {
         DVector::from_iterator(self.levels.len(), self.levels.iter().map(|l| l.start.ln()))
     }
 
+    /// The same where every error is as large as is usual at most.
+    pub fn large_start(&self) -> DVector<f64> {
+        let large = |l: &Level| match l.prior {
+            LevelPrior::Deviation { size, .. } => size.ln(),
+            LevelPrior::Ratio { .. } => l.start.ln(),
+        };
+        DVector::from_iterator(self.levels.len(), self.levels.iter().map(large))
+    }
+
     pub fn deviation(levels: &[usize], t: &DVector<f64>) -> f64 {
         levels.iter().map(|l| t[*l]).sum::<f64>().exp()
     }
@@ -306,22 +205,16 @@ impl Mixed {
         let mut constant = 0.0;
         let (whitened, log_determinant) = self.whitened(&noise, None)?;
         constant += log_determinant;
-        dispatch(
-            self.unit,
-            Accumulate { rows: &whitened.rows, width: self.width, size: n + 1, sum: &mut sum },
-        );
-        let entry = |i: usize, j: usize| sum[i.min(j) * self.width + i.max(j)];
-        constant += entry(n, n);
+        dispatch(self.unit, Accumulate::pairs(&whitened.rows, self.width, n + 1, &mut sum));
+        constant += sum[n * self.width + n];
         let mut information = self.given.clone();
         let mut right = self.given_right.clone();
-        for i in 0..n {
-            right[i] -= entry(i, n);
-            for j in i..n {
-                let value = entry(i, j);
-                information[(i, j)] += value;
-                if i != j {
-                    information[(j, i)] += value;
-                }
+        // The lower triangle, which is what is factorised.
+        let columns = information.as_mut_slice().chunks_exact_mut(n);
+        for (i, (column, row)) in columns.zip(sum.chunks_exact(self.width)).enumerate() {
+            right[i] -= row[n];
+            for (entry, value) in column[i..].iter_mut().zip(&row[i..n]) {
+                *entry += value;
             }
         }
         for (p, s) in self.priors.iter().zip(&prior) {
@@ -355,7 +248,10 @@ impl Mixed {
             Wanted::Value => {}
             Wanted::Slope => self.differentiate(&whitened, &noise, &prior, &mut evaluation),
             Wanted::Answer if apart => self.answer_apart(&noise, &prior, &mut evaluation)?,
-            Wanted::Answer => evaluation.information = information,
+            Wanted::Answer => {
+                information.fill_upper_triangle_with_lower_triangle();
+                evaluation.information = information;
+            }
         }
         Some(evaluation)
     }

@@ -11,6 +11,7 @@
 //! (average information), Rue, Martino and Chopin 2009 (nested Laplace), Huber 1967 and White 1980 (sandwich).
 
 mod agreement;
+mod assembly;
 mod cell;
 mod cell_start;
 mod component;
@@ -36,7 +37,7 @@ mod weak_prior;
 mod tests;
 
 pub use agreement::{Agreement, SetFit};
-pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station};
+pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station, Tip, Touch, TouchPoint};
 pub use cell_start::{CellStart, start_of_cell};
 pub use components::Assumptions;
 pub use levels::{Level, LevelPrior};

@@ -79,7 +79,7 @@ pub(super) fn slow_residuals(
     }
     let size = (columns + 1).next_multiple_of(TOGETHER);
     let mut gram = vec![0.0; size * width];
-    dispatch(VectorUnit::widest(), Accumulate { rows: &rows, width, size: columns + 1, sum: &mut gram });
+    dispatch(VectorUnit::widest(), Accumulate::pairs(&rows, width, columns + 1, &mut gram));
     eliminate(&mut gram, width, columns, fitted)
 }
 

@@ -118,7 +118,10 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
     let mut mode = None;
     while rounds < options.most_rounds {
         rounds += 1;
-        let found = find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()))?;
+        let found = match levels {
+            Some(levels) => find_mode(&mixed, levels)?,
+            None => first_mode(&mixed, cell.is_unseen())?,
+        };
         steps += found.steps;
         let answer = answer_at(&mixed, &found.t)?;
         let moved = largest_share(&answer, 6 * (cell.cameras.len() + cell.targets.len()));
@@ -185,6 +188,20 @@ pub(super) struct Mode {
     pub curvature: DMatrix<f64>,
     steps: usize,
     at_rest: bool,
+}
+
+/// The mode of the levels before any is known.
+///
+/// Without pictures an error of the arm passes for one of the detector, and the likelihood can have a mode for either:
+/// the search begins small and large, and the better end counts.
+fn first_mode(mixed: &Mixed, unseen: bool) -> Result<Mode, Error> {
+    let small = find_mode(mixed, mixed.start())?;
+    if !unseen {
+        return Ok(small);
+    }
+    let large = find_mode(mixed, mixed.large_start())?;
+    let steps = small.steps + large.steps;
+    Ok(Mode { steps, ..if large.value < small.value { large } else { small } })
 }
 
 /// Newton's method on the levels, damped until the penalised likelihood falls.

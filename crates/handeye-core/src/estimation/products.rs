@@ -4,7 +4,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::simd::{Kernel, Simd, Vector, VectorUnit, dispatch};
+use crate::simd::{Kernel, Simd, Vector};
 
 /// `L^-1` times rows, in place.
 pub(super) struct Whiten<'a> {
@@ -38,12 +38,24 @@ impl Kernel for Whiten<'_> {
 /// Columns whose products are summed together.
 pub(super) const TOGETHER: usize = 4;
 
-/// Adds the products of all pairs of columns: whole vectors of the upper triangle, row by row.
+/// Adds the products of columns of one matrix with columns of another, whose rows lie side by side: whole vectors, row
+/// by row; of a matrix with itself (`upper`) those of the upper triangle.
 pub(super) struct Accumulate<'a> {
-    pub rows: &'a [f64],
+    pub left: &'a [f64],
     pub width: usize,
+    /// Columns of the left that take part.
     pub size: usize,
+    pub right: &'a [f64],
+    pub across: usize,
+    pub upper: bool,
     pub sum: &'a mut [f64],
+}
+
+impl<'a> Accumulate<'a> {
+    /// All pairs of the first columns of one matrix.
+    pub fn pairs(rows: &'a [f64], width: usize, size: usize, sum: &'a mut [f64]) -> Self {
+        Self { left: rows, width, size, right: rows, across: width, upper: true, sum }
+    }
 }
 
 impl Kernel for Accumulate<'_> {
@@ -52,65 +64,87 @@ impl Kernel for Accumulate<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         for i in (0..self.size).step_by(TOGETHER) {
-            let first = i / S::LANES * S::LANES;
-            for at in (first..self.width).step_by(S::LANES) {
+            let first = if self.upper { i / S::LANES * S::LANES } else { 0 };
+            for at in (first..self.across).step_by(S::LANES) {
                 let mut totals = [simd.splat(0.0); TOGETHER];
                 for (k, total) in totals.iter_mut().enumerate() {
-                    *total = simd.load(&self.sum[(i + k) * self.width + at..]);
+                    *total = simd.load(&self.sum[(i + k) * self.across + at..]);
                 }
-                for row in self.rows.chunks_exact(self.width) {
-                    let values = simd.load(&row[at..]);
+                let pairs = self.left.chunks_exact(self.width).zip(self.right.chunks_exact(self.across));
+                for (left, right) in pairs {
+                    let values = simd.load(&right[at..]);
                     for (k, total) in totals.iter_mut().enumerate() {
-                        *total = simd.splat(row[i + k]).mul_add(values, *total);
+                        *total = simd.splat(left[i + k]).mul_add(values, *total);
                     }
                 }
                 for (k, total) in totals.iter().enumerate() {
-                    total.store(&mut self.sum[(i + k) * self.width + at..]);
+                    total.store(&mut self.sum[(i + k) * self.across + at..]);
                 }
             }
         }
     }
 }
 
-/// Rows (of `width`, the first `n` entries) times a symmetric matrix, column by column.
-pub(super) fn product_with(
-    unit: VectorUnit,
-    rows: &[f64],
-    width: usize,
-    size: usize,
-    matrix: &DMatrix<f64>,
-) -> Vec<f64> {
-    let mut out = vec![0.0; size * matrix.ncols()];
-    dispatch(unit, Product { rows, width, size, matrix, out: &mut out });
-    out
+/// Rows times a matrix, whole vectors at a time.
+pub(super) struct Product<'a> {
+    pub rows: &'a [f64],
+    pub width: usize,
+    /// Row by row, `across` apart; as many rows as columns of the rows take part.
+    pub matrix: &'a [f64],
+    pub across: usize,
+    pub out: &'a mut [f64],
 }
 
-struct Product<'a> {
-    rows: &'a [f64],
-    width: usize,
-    size: usize,
-    matrix: &'a DMatrix<f64>,
-    out: &'a mut [f64],
-}
+/// Rows that are multiplied together.
+const ROWS: usize = 6;
 
 impl Kernel for Product<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let n = self.matrix.ncols();
-        let whole = n / S::LANES * S::LANES;
-        for (j, column) in self.matrix.as_slice().chunks_exact(n).enumerate() {
-            for (r, row) in self.rows.chunks_exact(self.width).enumerate() {
+        let count = self.rows.len() / self.width;
+        for first in (0..count).step_by(ROWS) {
+            for at in (0..self.across).step_by(S::LANES) {
+                let mut totals = [simd.splat(0.0); ROWS];
+                for (i, line) in self.matrix.chunks_exact(self.across).enumerate() {
+                    let values = simd.load(&line[at..]);
+                    for (k, total) in totals.iter_mut().enumerate() {
+                        // Where rows run out, the last of them again.
+                        let row = (first + k).min(count - 1);
+                        *total = simd.splat(self.rows[row * self.width + i]).mul_add(values, *total);
+                    }
+                }
+                for (k, total) in totals.iter().enumerate().take(count - first) {
+                    total.store(&mut self.out[(first + k) * self.across + at..]);
+                }
+            }
+        }
+    }
+}
+
+/// Products of all rows of one matrix with all of another, over their first `width` columns.
+pub(super) struct RowProducts<'a> {
+    pub left: &'a [f64],
+    pub across: usize,
+    pub right: &'a [f64],
+    pub width: usize,
+    pub out: &'a mut [f64],
+}
+
+impl Kernel for RowProducts<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let count = self.right.len() / self.width;
+        for (left, out) in self.left.chunks_exact(self.across).zip(self.out.chunks_exact_mut(count)) {
+            for (right, out) in self.right.chunks_exact(self.width).zip(out) {
                 let mut total = simd.splat(0.0);
-                for at in (0..whole).step_by(S::LANES) {
-                    total = simd.load(&row[at..]).mul_add(simd.load(&column[at..]), total);
+                for at in (0..self.width).step_by(S::LANES) {
+                    total = simd.load(&left[at..]).mul_add(simd.load(&right[at..]), total);
                 }
-                let mut value = total.sum();
-                for at in whole..n {
-                    value += row[at] * column[at];
-                }
-                self.out[j * self.size + r] = value;
+                *out = total.sum();
             }
         }
     }

@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::mixed::{Evaluation, Mixed};
-use super::products::{Accumulate, TOGETHER};
+use super::mixed::{Evaluation, Mixed, add};
+use super::products::{Accumulate, Product, TOGETHER};
 use crate::positive::Factor;
 use crate::simd::{MAX_LANES, dispatch};
 
@@ -27,34 +27,46 @@ impl Mixed {
         for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| q.recurring) {
             scales[q.first - p..q.first - p + q.count].fill(*s);
         }
-        let mut shared = DMatrix::<f64>::zeros(p, recurring);
-        let narrow = p.next_multiple_of(MAX_LANES);
-        let tall = p.next_multiple_of(TOGETHER);
-        let mut own = vec![0.0; tall * narrow];
-        let mut sum = vec![0.0; tall * self.width];
         let n = self.size;
         let (whitened, _) = self.whitened(noise, Some(prior))?;
-        let rows = &whitened.rows;
-        dispatch(self.unit, Accumulate { rows, width: self.width, size: p, sum: &mut sum });
-        // What the recurring errors of each station do to the answer, a row for each of them.
-        let mut by_station = vec![0.0; self.stations.len() * recurring * narrow];
-        let mut here = vec![0.0; tall * self.width];
-        let mut first = 0;
-        for (station, by_station) in self.stations.iter().zip(by_station.chunks_exact_mut(recurring * narrow))
-        {
-            let end = first + station.size * self.width;
-            here.fill(0.0);
-            let rows = &whitened.rows[first..end];
-            dispatch(self.unit, Accumulate { rows, width: self.width, size: p, sum: &mut here });
-            first = end;
-            for ((j, scale), row) in scales.iter().enumerate().zip(by_station.chunks_exact_mut(narrow)) {
-                for (i, entry) in row[..p].iter_mut().enumerate() {
-                    *entry = here[i * self.width + p + j] * scale;
-                    shared[(i, j)] += *entry;
-                }
-            }
+        let rows = &whitened.rows[..];
+        let mut sum = vec![0.0; p.next_multiple_of(TOGETHER) * self.width];
+        dispatch(self.unit, Accumulate::pairs(rows, self.width, p, &mut sum));
+        let shared = DMatrix::from_fn(p, recurring, |i, j| sum[i * self.width + p + j] * scales[j]);
+        // What the recurring errors of each station do to the answer, of their covariance there.
+        let narrow = p.next_multiple_of(MAX_LANES);
+        let mut told = vec![0.0; rows.len() / self.width * narrow];
+        for (to, row) in told.chunks_exact_mut(narrow).zip(rows.chunks_exact(self.width)) {
+            to.copy_from_slice(&row[..narrow]);
         }
-        dispatch(self.unit, Accumulate { rows: &by_station, width: narrow, size: p, sum: &mut own });
+        let mut moved = vec![0.0; told.len()];
+        let mut first = 0;
+        for (k, (station, factor)) in self.stations.iter().zip(&whitened.factors).enumerate() {
+            let end = first + station.size * narrow;
+            let covariance = self.recurring_at(k, prior, factor);
+            let product = Product {
+                rows: covariance.as_slice(),
+                width: station.size,
+                matrix: &told[first..end],
+                across: narrow,
+                out: &mut moved[first..end],
+            };
+            if station.size > 0 {
+                dispatch(self.unit, product);
+            }
+            first = end;
+        }
+        let mut own = vec![0.0; p.next_multiple_of(TOGETHER) * narrow];
+        let both = Accumulate {
+            left: &told,
+            width: narrow,
+            size: p,
+            right: &moved,
+            across: narrow,
+            upper: true,
+            sum: &mut own,
+        };
+        dispatch(self.unit, both);
         for i in 0..p {
             right[i] -= sum[i * self.width + n];
             for j in i..p {
@@ -73,5 +85,17 @@ impl Mixed {
         evaluation.theta = theta;
         evaluation.information = information;
         Some(())
+    }
+
+    /// Covariance of the recurring errors of a station in units of its noise, whose Cholesky factor is given.
+    fn recurring_at(&self, k: usize, prior: &[f64], factor: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut covariance = DMatrix::zeros(factor.nrows(), factor.nrows());
+        for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| q.recurring) {
+            add(&mut covariance, s * s, &q.squares[k]);
+        }
+        factor.solve_lower_triangular_unchecked_mut(&mut covariance);
+        covariance.transpose_mut();
+        factor.solve_lower_triangular_unchecked_mut(&mut covariance);
+        covariance
     }
 }

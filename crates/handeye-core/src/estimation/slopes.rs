@@ -6,7 +6,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::mixed::{Evaluation, Mixed, Whitened};
-use super::products::product_with;
+use super::products::{Accumulate, Product, RowProducts, TOGETHER, Whiten};
+use crate::simd::{MAX_LANES, dispatch};
 
 impl Mixed {
     /// Slope and curvature.
@@ -20,10 +21,6 @@ impl Mixed {
         let n = self.size;
         let Evaluation { slope, curvature, theta, covariance, .. } = evaluation;
         let terms = self.noises.len() + self.priors.len();
-        // dV P y of each term, whitened, and B' V^-1 of it.
-        let mut pulled = vec![vec![0.0; n]; terms];
-        let mut products = DMatrix::<f64>::zeros(terms, terms);
-        let mut slopes = vec![0.0; terms];
         // Deviations of the parameters from their priors.
         let deviations: Vec<Vec<f64>> = self
             .priors
@@ -36,37 +33,18 @@ impl Mixed {
                 u
             })
             .collect();
-        let mut rest = &whitened.rows[..];
-        for (k, factor) in whitened.factors.iter().enumerate() {
-            let size = self.stations[k].size;
-            let (rows, after) = rest.split_at(size * self.width);
-            rest = after;
-            let b = DMatrix::from_row_slice(size, self.width, rows);
-            let bs = DMatrix::from_vec(size, n, product_with(self.unit, rows, self.width, size, covariance));
-            let b_of = b.columns(0, n);
-            let spread = &bs * b_of.transpose();
-            // Whitened P y.
-            let q = b.column(n) + b_of * &*theta;
-            let mut acts: Vec<DVector<f64>> = Vec::with_capacity(terms);
-            for (j, (x, s)) in self.noises.iter().zip(noise).enumerate() {
-                let mut root = x.roots[k].clone();
-                factor.solve_lower_triangular_mut(&mut root);
-                let along = root.tr_mul(&q);
-                let trace = root.norm_squared() - (&spread * &root).dot(&root);
-                slopes[j] += s * s * (trace - along.norm_squared());
-                acts.push(&root * along * (2.0 * s * s));
-            }
-            for (p, u) in self.priors.iter().zip(&deviations) {
-                acts.push(b_of.columns(p.first, p.count) * DVector::from_column_slice(u) * -2.0);
-            }
-            for i in 0..terms {
-                for j in 0..=i {
-                    products[(i, j)] += acts[i].dot(&acts[j]);
-                }
-                let onto = b_of.tr_mul(&acts[i]);
-                pulled[i].iter_mut().zip(onto.iter()).for_each(|(a, b)| *a += b);
-            }
-        }
+        let (acts, mut slopes) = self.acts(whitened, noise, theta, covariance, &deviations);
+        // B' V^-1 dV P y of each term, and the products of what they do.
+        let across = terms.next_multiple_of(MAX_LANES);
+        let mut sum = vec![0.0; n.next_multiple_of(TOGETHER) * across];
+        let (left, width) = (&whitened.rows[..], self.width);
+        let onto = Accumulate { left, width, size: n, right: &acts, across, upper: false, sum: &mut sum };
+        dispatch(self.unit, onto);
+        let mut pulled: Vec<DVector<f64>> =
+            (0..terms).map(|j| DVector::from_fn(n, |i, _| sum[i * across + j])).collect();
+        let mut sum = vec![0.0; terms.next_multiple_of(TOGETHER) * across];
+        dispatch(self.unit, Accumulate::pairs(&acts, across, terms, &mut sum));
+        let mut products = DMatrix::from_fn(terms, terms, |i, j| sum[i.min(j) * across + i.max(j)]);
         for (i, (p, s)) in self.priors.iter().zip(prior).enumerate() {
             let weight = s.powi(-2);
             let u = &deviations[i];
@@ -86,10 +64,8 @@ impl Mixed {
                 let product = 4.0 * DVector::from_column_slice(u).dot(&(between * v));
                 products[(at, self.noises.len() + j)] += product;
             }
-            let onto = self.given.columns(p.first, p.count) * DVector::from_column_slice(u) * -2.0;
-            pulled[at].iter_mut().zip(onto.iter()).for_each(|(a, b)| *a += b);
+            pulled[at] += self.given.columns(p.first, p.count) * DVector::from_column_slice(u) * -2.0;
         }
-        let pulled: Vec<DVector<f64>> = pulled.into_iter().map(DVector::from_vec).collect();
         let solved: Vec<DVector<f64>> = pulled.iter().map(|v| &*covariance * v).collect();
         let of = |i: usize| -> &[usize] {
             if i < self.noises.len() {
@@ -118,5 +94,110 @@ impl Mixed {
                 }
             }
         }
+    }
+
+    /// `dV P y` of each term, whitened, in the rows of the stations; of each noise, twice its slope.
+    fn acts(
+        &self,
+        whitened: &Whitened,
+        noise: &[f64],
+        theta: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+        deviations: &[Vec<f64>],
+    ) -> (Vec<f64>, Vec<f64>) {
+        let n = self.size;
+        let terms = self.noises.len() + self.priors.len();
+        let across = terms.next_multiple_of(MAX_LANES);
+        // The covariance, theta and the deviations side by side: rows times them give what is needed of the rows.
+        let wide = (n + 1 + self.priors.len()).next_multiple_of(MAX_LANES);
+        let mut matrix = vec![0.0; n * wide];
+        for (i, line) in matrix.chunks_exact_mut(wide).enumerate() {
+            line[..n].copy_from_slice(&covariance.as_slice()[i * n..(i + 1) * n]);
+            line[n] = theta[i];
+        }
+        for (j, (p, u)) in self.priors.iter().zip(deviations).enumerate() {
+            for (i, value) in p.range().zip(u) {
+                matrix[i * wide + n + 1 + j] = *value;
+            }
+        }
+        let mut slopes = vec![0.0; terms];
+        let mut all = vec![0.0; whitened.rows.len() / self.width * across];
+        let (mut rest, mut rest_acts) = (&whitened.rows[..], &mut all[..]);
+        let (mut through, mut spread, mut roots, mut turned) = (vec![], vec![], vec![], vec![]);
+        for (station, factor) in self.stations.iter().zip(&whitened.factors) {
+            let size = station.size;
+            if size == 0 {
+                continue;
+            }
+            let (rows, after) = rest.split_at(size * self.width);
+            let (acts, acts_after) = rest_acts.split_at_mut(size * across);
+            (rest, rest_acts) = (after, acts_after);
+            through.clear();
+            through.resize(size * wide, 0.0);
+            spread.clear();
+            spread.resize(size * size, 0.0);
+            let product =
+                Product { rows, width: self.width, matrix: &matrix, across: wide, out: &mut through };
+            dispatch(self.unit, product);
+            // Whitened P y.
+            let mut q = Vec::with_capacity(size);
+            for ((row, through), acts) in rows
+                .chunks_exact(self.width)
+                .zip(through.chunks_exact_mut(wide))
+                .zip(acts.chunks_exact_mut(across))
+            {
+                q.push(row[n] + through[n]);
+                for (act, moved) in acts[self.noises.len()..terms].iter_mut().zip(&through[n + 1..]) {
+                    *act = -2.0 * moved;
+                }
+                // Beside it stand the measurements in the rows.
+                through[n] = 0.0;
+            }
+            let products = RowProducts {
+                left: &through,
+                across: wide,
+                right: rows,
+                width: self.width,
+                out: &mut spread,
+            };
+            dispatch(self.unit, products);
+            if station.roots.is_empty() {
+                continue;
+            }
+            roots.clear();
+            roots.extend_from_slice(&station.roots);
+            let columns = roots.len() / size;
+            dispatch(self.unit, Whiten { factor, rows: &mut roots, width: columns });
+            turned.clear();
+            turned.resize(roots.len(), 0.0);
+            let product =
+                Product { rows: &spread, width: size, matrix: &roots, across: columns, out: &mut turned };
+            dispatch(self.unit, product);
+            let mut along = vec![0.0; columns];
+            let mut traces = vec![0.0; columns];
+            for ((root, turned), q) in roots.chunks_exact(columns).zip(turned.chunks_exact(columns)).zip(&q) {
+                for (c, (root, turned)) in root.iter().zip(turned).enumerate() {
+                    along[c] += root * q;
+                    traces[c] += root * (root - turned);
+                }
+            }
+            for (root, acts) in roots.chunks_exact(columns).zip(acts.chunks_exact_mut(across)) {
+                let mut first = 0;
+                for ((x, s), act) in self.noises.iter().zip(noise).zip(acts) {
+                    let range = first..first + x.columns;
+                    first = range.end;
+                    let moved: f64 = root[range.clone()].iter().zip(&along[range]).map(|(a, b)| a * b).sum();
+                    *act = 2.0 * s * s * moved;
+                }
+            }
+            let mut first = 0;
+            for ((x, s), slope) in self.noises.iter().zip(noise).zip(&mut slopes) {
+                let range = first..first + x.columns;
+                first = range.end;
+                let squared: f64 = along[range.clone()].iter().map(|a| a * a).sum();
+                *slope += s * s * (traces[range].iter().sum::<f64>() - squared);
+            }
+        }
+        (all, slopes)
     }
 }

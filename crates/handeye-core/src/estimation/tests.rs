@@ -1,6 +1,6 @@
 //! Slopes against differences, cells of several cameras against their truth, and levels against what was put in.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector3, Vector6};
 
 use super::components;
 use super::linearisation::{Guess, linearise};
@@ -20,6 +20,7 @@ struct Truth {
 fn assumptions(described: bool) -> Assumptions {
     Assumptions {
         exact_robot: false,
+        roughness: 1.0,
         joint_scales: if described { vec![1.0; 4] } else { vec![] },
         free_joints: if described { vec![1, 2] } else { vec![] },
         link_lengths: if described { vec![true, false] } else { vec![] },
@@ -41,13 +42,21 @@ fn made(seed: u64, bodies: (&[Body], &[Body]), stations: usize, flange: f64, des
         targets: bodies.1.to_vec(),
         board_scale: false,
         measurements: vec![],
+        tips: vec![],
+        touches: vec![],
     };
     for k in 0..stations {
         let reported = random.transform(0.6, 1.2);
         let mut part = |n: usize| DMatrix::from_fn(6, n, |_, _| random.uniform(-1.0, 1.0));
         let (joints, links) = (described.then(|| part(4)), described.then(|| part(2)));
         let twist = Vector6::from_fn(|_, _| random.normal()) * flange;
-        cell.stations.push(Station { pose: reported * Se3::exp(&twist), joints, velocity: None, links });
+        cell.stations.push(Station {
+            pose: reported * Se3::exp(&twist),
+            joints,
+            velocity: None,
+            links,
+            approach: None,
+        });
         for (c, of_camera) in x.iter().enumerate() {
             for (t, of_target) in y.iter().enumerate() {
                 let measured = Measurement {
@@ -228,4 +237,97 @@ fn pixels_twice_as_noisy_are_poses_twice_as_loose() {
     });
     let [noisy, loose] = &found;
     assert!((&noisy.covariance - &loose.covariance).amax() < 1e-9 * loose.covariance.amax());
+}
+
+/// Corners of the board touched with a tip at poses of their own, and poses at which the tip turns about a fixed point.
+fn touched(truth: &mut Truth, scale: f64, sigma: f64) {
+    let random = &mut Random::new(71);
+    let tip = Vector3::new(0.01, -0.02, 0.15);
+    let fixed = Vector3::new(0.4, 0.1, 0.2);
+    let cell = &mut truth.cell;
+    cell.board_scale = true;
+    for m in &mut cell.measurements {
+        // Pictures that know nothing of the size of the board.
+        m.pose.sensitivity = Matrix6xX::zeros(2);
+        m.pose.camera_information = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.0]));
+        m.pose.camera_gradient = DVector::zeros(2);
+    }
+    let loose = nalgebra::Matrix3::identity();
+    cell.tips = vec![
+        Tip { body: Body::Flange, at: tip + Vector3::new(1e-3, 0.0, 0.0), information: loose },
+        Tip { body: Body::Base, at: fixed + Vector3::new(0.0, 2e-3, 0.0), information: loose },
+    ];
+    let corners = [(0.0, 0.0), (0.2, 0.0), (0.0, 0.15)].map(|(u, v)| Vector3::new(u, v, 0.0));
+    for k in 0..9 {
+        let turn = random.transform(0.0, 1.0);
+        let (place, other) = match corners.get(k) {
+            Some(corner) => {
+                (truth.y[0].act(&(corner * (1.0 + scale))), TouchPoint::OfTarget { target: 0, at: *corner })
+            }
+            None => (fixed, TouchPoint::Tip(1)),
+        };
+        let noise = Vector3::from_fn(|_, _| random.normal()) * sigma;
+        let pose = Se3::new(turn.rotation, place + noise - turn.rotation * tip);
+        let (joints, links) = (None, None);
+        cell.stations.push(Station { pose, joints, velocity: None, links, approach: None });
+        cell.touches.push(Touch {
+            station: cell.stations.len() - 1,
+            points: [TouchPoint::Tip(0), other],
+            covariance: nalgebra::Matrix3::identity() * sigma * sigma,
+        });
+    }
+}
+
+#[test]
+fn rows_of_touches_are_their_derivatives() {
+    let mut truth = made(70, (&[Body::Flange], &[Body::Base]), 4, 0.0, false);
+    touched(&mut truth, 0.01, 1e-4);
+    let guess = Guess { x: truth.x.clone(), y: truth.y.clone() };
+    let at = |cell: &Cell, guess: &Guess| linearise(cell, guess).stations[4].clone();
+    let here = at(&truth.cell, &guess);
+    let step = 1e-6;
+    for j in 0..6 {
+        let mut xi = Vector6::zeros();
+        xi[j] = step;
+        let mut moved = guess.clone();
+        moved.y[0] = Se3::exp(&xi) * moved.y[0];
+        let of_y = (at(&truth.cell, &moved).e - &here.e) / step;
+        assert!((of_y - here.b.column(6 + j)).amax() < 1e-5);
+        let mut stands = truth.cell.clone();
+        stands.stations[4].pose = stands.stations[4].pose * Se3::exp(&xi);
+        assert!(((at(&stands, &guess).e - &here.e) / step - here.flange.column(j)).amax() < 1e-5);
+        stands.stations[4].pose = Se3::exp(&xi) * truth.cell.stations[4].pose;
+        assert!(((at(&stands, &guess).e - &here.e) / step - here.base.column(j)).amax() < 1e-5);
+    }
+    let columns = truth.cell.columns();
+    for j in 0..3 {
+        let mut moved = truth.cell.clone();
+        moved.tips[0].at[j] += step;
+        let of_tip = (at(&moved, &guess).e - &here.e) / step;
+        assert!((of_tip - here.b.column(columns.tips + j)).amax() < 1e-5);
+    }
+    let mut larger = truth.cell.clone();
+    larger.touches[0].points[1] = TouchPoint::OfTarget { target: 0, at: Vector3::new(step, 0.0, 0.0) };
+    let mut column = here.b.column(columns.boards).into_owned();
+    assert!(column.amax() < 1e-12, "the origin does not move with the size");
+    column.copy_from(&linearise(&truth.cell, &guess).stations[5].b.column(columns.boards));
+    assert!((column - truth.y[0].rotation * Vector3::new(0.2, 0.0, 0.0)).amax() < 1e-12);
+}
+
+#[test]
+fn touches_find_the_size_of_a_board_and_the_tip() {
+    let mut truth = made(72, (&[Body::Flange], &[Body::Base]), 12, 2e-5, false);
+    touched(&mut truth, 0.005, 2e-5);
+    let found = estimate(&truth.cell, (truth.x.clone(), truth.y.clone()), &options(false)).unwrap();
+    let columns = truth.cell.columns();
+    let scale = (found.theta[columns.boards], found.covariance[(columns.boards, columns.boards)].sqrt());
+    assert!((scale.0 - 0.005).abs() < 3.0 * scale.1 && scale.1 < 5e-4, "{scale:?}");
+    // Where it was believed to be was 1 mm off.
+    assert!((found.theta[columns.tips] + 1e-3).abs() < 2e-4, "{}", found.theta[columns.tips]);
+    let mut seen_there = truth.cell.clone();
+    seen_there.touches[0].station = 0;
+    assert!(estimate(&seen_there, (truth.x.clone(), truth.y.clone()), &options(false)).is_err());
+    let mut same_body = truth.cell.clone();
+    same_body.tips[1].body = Body::Flange;
+    assert!(estimate(&same_body, (truth.x, truth.y), &options(false)).is_err());
 }

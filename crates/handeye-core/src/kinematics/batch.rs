@@ -79,6 +79,26 @@ impl Chain {
         Ok(())
     }
 
+    /// Poses in the base as row-major 4 x 4 matrices, `n + 2` of each configuration: the base itself, each joint in its
+    /// own frame where it has moved, the flange.
+    ///
+    /// # Errors
+    /// As [`Chain::forward_all`].
+    pub fn frames_all(&self, q: &[f64], frames: &mut [f64]) -> Result<(), Error> {
+        let count = self.check(q)?;
+        let each = MATRIX * (self.len() + 2);
+        if frames.len() != count * each {
+            return Err(Error::invalid(format!("{} entries for {count} times {each}", frames.len())));
+        }
+        for (q, out) in q.chunks_exact(self.len()).zip(frames.chunks_exact_mut(each)) {
+            let (flange, moved) = self.moved(q);
+            let base = Se3::identity();
+            let all = [&base].into_iter().chain(&moved[..self.len()]).chain([&flange]);
+            all.zip(out.chunks_exact_mut(MATRIX)).for_each(|(frame, out)| write_pose(frame, out));
+        }
+        Ok(())
+    }
+
     /// Twists of the flange where joints sit displaced on the link before them, as row-major 6 x m matrices, one after
     /// another: column `w` for `ways[w]`, a joint and its twist in its own frame before it moves.
     ///

@@ -67,6 +67,18 @@ impl Chain {
         (t, places)
     }
 
+    /// `T_base_flange`, and each joint in its own frame where it has moved.
+    pub(super) fn moved(&self, q: &[f64]) -> (Se3, [Se3; MAX_JOINTS]) {
+        let mut moved = [Se3::identity(); MAX_JOINTS];
+        let mut t = self.links[0];
+        for (i, joint) in self.joints().iter().enumerate() {
+            move_joint(&mut t, joint.kind, q[i]);
+            moved[i] = t * self.turns[i];
+            t = t * self.links[i + 1];
+        }
+        (t, moved)
+    }
+
     /// The flange, and in base coordinates a point on and the direction of every joint's axis.
     pub(super) fn axes(&self, q: &[f64]) -> (Se3, [Vector3<f64>; MAX_JOINTS], [Vector3<f64>; MAX_JOINTS]) {
         let mut places = [Vector3::zeros(); MAX_JOINTS];

@@ -6,6 +6,7 @@
 
 mod batch;
 mod chain;
+mod clearance;
 mod forward;
 mod inverse;
 #[cfg(test)]
@@ -13,5 +14,6 @@ mod tests;
 
 pub use batch::Frame;
 pub use chain::{Chain, Joint, JointKind, MAX_JOINTS};
+pub use clearance::{CapsulePair, least_gaps};
 pub use forward::Columns;
 pub use inverse::{InverseOptions, Reach, Unreached};

@@ -254,6 +254,30 @@ fn redundant_and_short_arms_are_solved_too() {
 }
 
 #[test]
+fn frames_are_those_of_the_joints_in_turn() {
+    let mut random = Random::new(4);
+    let chain = random_chain(&mut random, 7);
+    let q = posture(&mut random, &chain);
+    let mut frames = [0.0; 9 * 16];
+    chain.frames_all(&q, &mut frames).unwrap();
+    let frame = |i: usize| Matrix4::from_row_slice(&frames[16 * i..16 * (i + 1)]);
+    assert_eq!(frame(0), Matrix4::identity());
+    let mut t = Se3::identity();
+    for (i, (joint, q)) in chain.joints().iter().zip(&q).enumerate() {
+        let moved = match joint.kind {
+            JointKind::Revolute => Vector6::new(0.0, 0.0, 0.0, joint.axis.x, joint.axis.y, joint.axis.z) * *q,
+            JointKind::Prismatic => {
+                Vector6::new(joint.axis.x, joint.axis.y, joint.axis.z, 0.0, 0.0, 0.0) * *q
+            }
+        };
+        t = t * joint.placement * Se3::exp(&moved);
+        assert!((frame(i + 1) - t.to_matrix()).amax() < 1e-12, "joint {i}");
+    }
+    assert!((frame(8) - chain.forward(&q).to_matrix()).amax() < 1e-12);
+    assert!(chain.frames_all(&q, &mut [0.0; 16]).is_err());
+}
+
+#[test]
 fn every_joint_has_its_limits() {
     let mut random = Random::new(12);
     let chain = random_chain(&mut random, 7);

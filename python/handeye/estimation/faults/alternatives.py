@@ -5,7 +5,7 @@ best are explained like the recording as given. One is named if its evidence is 
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,6 +22,8 @@ from handeye.estimation.faults.kinds import (
     view_shuffled,
     wrong_direction,
 )
+from handeye.estimation.faults.kinds.numbers import angles_between
+from handeye.estimation.faults.kinds.wrong_rotation import ODD
 from handeye.estimation.faults.shuffles import find_pairing
 from handeye.estimation.faults.stations import Stations, centres, inverted, target_centre
 from handeye.estimation.measurements import Measurements
@@ -31,7 +33,11 @@ from handeye.types.recording import Recording
 
 # Logarithm of the factor in evidence that another way to understand all views must have.
 CLEARLY_BETTER = 20.0
-# So many are explained, of those whose misfit is less than this share of that as given.
+# Within this of the best another way explains the views as well; so many are named.
+AS_WELL = 10.0
+MOST_RIVALS = 2
+# So many usual and so many odd ones are explained, of those whose misfit is less than this share of that as
+# given.
 MOST_EXPLAINED = 8
 BETTER_SHARE = 0.7
 # Angles between views may be off by so much, in the middle, before a reading is dropped.
@@ -42,27 +48,32 @@ DENSITY_OF_NO_MISTAKE = -30.0
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
-    """Another way to understand all views, and how well it explains them."""
+    """Another way to understand all views, how well it explains them, and ways that do so as well."""
 
     hypothesis: Hypothesis
     explanation: Explanation
     log_evidence: float
+    rivals: tuple[Hypothesis, ...] = ()
 
 
 def find_alternative(measurements: Measurements, given: Explanation | None) -> Alternative | None:
     """Find another way to understand all views that explains them much better, None if there is none."""
     bearable = given is not None and given.constants_are_bearable
     needed = given.log_evidence + CLEARLY_BETTER if given is not None and bearable else -math.inf
-    best: Alternative | None = None
+    found: list[Alternative] = []
     for hypothesis in [*_promising(measurements), *_paired(measurements, given)]:
         try:
             explanation = explain(hypothesis.applied(measurements))
         except HandeyeError:
             continue
         evidence = explanation.log_evidence + hypothesis.log_prior + hypothesis.log_unit
-        if evidence > needed and explanation.is_bearable and (best is None or evidence > best.log_evidence):
-            best = Alternative(hypothesis, explanation, evidence)
-    return best
+        if evidence > needed and explanation.is_bearable:
+            found.append(Alternative(hypothesis, explanation, evidence))
+    if not found:
+        return None
+    best = max(found, key=lambda alternative: alternative.log_evidence)
+    close = [a.hypothesis for a in found if a is not best and a.log_evidence > best.log_evidence - AS_WELL]
+    return replace(best, rivals=tuple(close))
 
 
 def refuse_alternative(
@@ -102,9 +113,12 @@ def _told(
         if given is not None
         else ""
     )
+    rivals = [rival.sentence for rival in alternative.rivals if rival.kind is not hypothesis.kind]
+    as_well = f"; as well it may be that {' or that '.join(rivals[:MOST_RIVALS])}" if rivals else ""
     return SharedFaultError(
         f"{sentence}: read so, {numbers['agreeing']} of {numbers['views']} views agree within "
-        f"{numbers['robot_translation_mm']:.2g} mm and {numbers['robot_rotation_deg']:.2g} deg{apart}",
+        f"{numbers['robot_translation_mm']:.2g} mm and {numbers['robot_rotation_deg']:.2g} deg"
+        f"{apart}{as_well}",
         hypothesis,
         hint=hint,
     )
@@ -161,13 +175,28 @@ def _promising(measurements: Measurements) -> list[Hypothesis]:
         if misfit < limit:
             ranked.append((misfit, -hypothesis.log_prior, number, hypothesis))
     ranked.sort(key=lambda entry: (round(math.log(max(entry[0], 1e-12)), 3), entry[1], entry[2]))
-    return [hypothesis for *_, hypothesis in ranked[:MOST_EXPLAINED]]
+    return _different(ranked)
+
+
+def _different(ranked: Sequence[tuple[float, float, int, Hypothesis]]) -> list[Hypothesis]:
+    """Return the first few hypotheses that are not the same but for X and Y, usual and odd ones apart."""
+    chosen: list[Hypothesis] = []
+    known: set[tuple[str, bool, float]] = set()
+    left = {True: MOST_EXPLAINED, False: MOST_EXPLAINED}
+    for misfit, *_, hypothesis in ranked:
+        # What misses by exactly as much is the same up to a change of X and Y: the most usual stands for all.
+        what = (hypothesis.kind.code, hypothesis.poses is None, round(math.log(max(misfit, 1e-12)), 7))
+        odd = hypothesis.log_prior <= ODD
+        if what not in known and left[odd] > 0:
+            chosen.append(hypothesis)
+            left[odd] -= 1
+        known.add(what)
+    return chosen
 
 
 def _turns(poses: FloatArray) -> FloatArray:
     """Return the rotation angles between all pairs of poses (K, 4, 4)."""
-    flat = poses[:, :3, :3].reshape(len(poses), 9)
-    return np.arccos(np.clip(((flat @ flat.T)[np.triu_indices(len(flat), 1)] - 1) / 2, -1, 1))
+    return angles_between(poses[:, :3, :3], poses[:, :3, :3])[np.triu_indices(len(poses), 1)]
 
 
 def _median_gap(one: FloatArray, other: FloatArray) -> float:

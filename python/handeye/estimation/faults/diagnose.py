@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 
 from handeye.errors import HandeyeError
-from handeye.estimation.faults.examine import Examination, examine
+from handeye.estimation.faults.examine import Examination, examine, measured
 from handeye.estimation.faults.kinds import SharedFaultError
-from handeye.estimation.measurements import Measurements
 from handeye.types.calibration import Finding
 from handeye.types.recording import Recording
 
@@ -43,7 +42,7 @@ def diagnose(recording: Recording) -> Diagnosis:
     current = recording
     for _ in range(MOST_SHARED + 1):
         try:
-            examination = examine(Measurements.of_recording(current))
+            examination = examine(measured(current))
         except SharedFaultError as error:
             refused = refused or error
             findings.append(_finding(error))

@@ -11,16 +11,15 @@ from handeye.estimation.faults.kinds import repeated_view, stale_poses, wrong_un
 from handeye.estimation.faults.kinds.view_flipped import flipped_finding
 from handeye.estimation.faults.kinds.view_shuffled import pairing_words, shuffled_finding
 from handeye.estimation.faults.lone import lone_finding
-from handeye.estimation.faults.pictures import examine_pictures
+from handeye.estimation.faults.pictures import FEWEST_VIEWS, check_lens, examine_pictures
 from handeye.estimation.faults.points import without_gross_points
 from handeye.estimation.faults.relabel import Relabeling, shifts
 from handeye.estimation.faults.selection import weigh_pairs
 from handeye.estimation.faults.shuffles import Pairing, pair_suspects
 from handeye.estimation.measurements import Measurements, ViewPose
 from handeye.types.calibration import Calibration, Finding
+from handeye.types.recording import Recording
 from handeye.types.view import View
-
-FEWEST_VIEWS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +58,20 @@ class Examination:
             for view in calibration.views
         )
         return replace(calibration, views=views, diagnosis=(*self.findings, *calibration.diagnosis))
+
+
+def measured(recording: Recording) -> Measurements:
+    """Return the measurements of a recording.
+
+    Raises
+    ------
+    SharedFaultError
+        Through the camera as stated most views show nothing, and another camera shows them.
+    """
+    measurements = Measurements.of_recording(recording)
+    if 2 * len(measurements) < len(recording):
+        check_lens(recording)
+    return measurements
 
 
 def examine(measurements: Measurements) -> Examination:

@@ -20,6 +20,7 @@ from handeye.types.calibration import Finding
 from handeye.types.camera import Camera
 from handeye.types.recording import Recording
 
+FEWEST_VIEWS = 3
 # Views that fit their own pose within this need no other camera.
 HEALTHY_PX = 0.35
 # A camera of their own must bring the residual of the views down to this share; no nine parameters do that to
@@ -55,7 +56,7 @@ def examine_pictures(measurements: Measurements, *, closely: bool = False) -> tu
         return ()
     found = None if measurements.camera.from_views else recalibrated(measurements)
     after = before if found is None else found.after_px
-    if after > HEALTHY_PX:  # No camera explains them.
+    if after > HEALTHY_PX or closely:  # No camera explains them, or none that robot and images agree with.
         shear, left = sheared_pictures.find_shear(measurements)
         if left < SHEAR_SHARE * after and abs(shear) > LEAST_SHEAR:
             raise _sheared(before, shear, left)
@@ -74,6 +75,24 @@ def examine_pictures(measurements: Measurements, *, closely: bool = False) -> tu
     if after < (WRONG_SHARE if before > HEALTHY_PX else SMALL_SHARE) * before:
         raise _other_camera(kind, sentence, found)
     return ()
+
+
+def check_lens(recording: Recording) -> None:
+    """Look for another camera where the lens as stated shows hardly any view at all.
+
+    Raises
+    ------
+    SharedFaultError
+        The camera is not that of the pictures.
+    """
+    given = recording.camera
+    if not len(given.distortion):
+        return
+    pinhole = Camera("pinhole", given.parameters[:4], *given.size_px)
+    plain = Measurements.of_recording(replace(recording, camera=pinhole))
+    found = recalibrated(plain) if len(plain) >= FEWEST_VIEWS else None
+    if found is not None and found.after_px < min(HEALTHY_PX, SMALL_SHARE * found.before_px):
+        raise _other_camera(*wrong_camera.told(given, found.camera), found)
 
 
 def _stated_px(camera: Camera) -> float:

@@ -25,10 +25,11 @@ MISTAKE_SIZES_M = np.geomspace(1e-3, 1.0, 7)
 MISTAKE_LEVERS_M = np.array([0.1, 0.4, 1.6])
 LARGEST_MISTAKE_RAD = 1.5
 # The error of an arm changes with its posture: here and there a pose is off by more than the others, and no
-# mistake.
+# mistake. By so much, or by so many times the noise of the arm as the members show it.
 ODD_SHARE = 0.1
 ODD_TRANSLATION_M = 0.7e-3
 ODD_ROTATION_RAD = np.deg2rad(0.07)
+ODD_RATIO = 2.0
 # A view whose density outweighs that of a mistake by this factor (a logarithm) joins without waiting its
 # turn.
 CLEAR = 5.0
@@ -80,7 +81,9 @@ def mistake_log_density(agreement: Agreement, fit: SetFit) -> FloatArray:
 def member_log_density(agreement: Agreement, fit: SetFit) -> FloatArray:
     """(K,) density of the twists if the views belong: as predicted, or odd as an arm may be."""
     deviation, covariance = agreement.at_flange(fit)
-    odd = np.array([ODD_TRANSLATION_M**2] * 3 + [ODD_ROTATION_RAD**2] * 3)
+    translation, rotation = agreement.robot_levels(fit)
+    largest = (max(ODD_TRANSLATION_M, ODD_RATIO * translation), max(ODD_ROTATION_RAD, ODD_RATIO * rotation))
+    odd = np.square(np.repeat(largest, 3))
     log_odd = _log_gaussian(deviation, covariance + _diagonal(odd))
     return np.logaddexp(np.log1p(-ODD_SHARE) + fit.log_density, np.log(ODD_SHARE) + log_odd)
 

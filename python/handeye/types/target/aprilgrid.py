@@ -55,6 +55,11 @@ class AprilGrid(Numbered, MarkerCorners):
     ------
     InputError
         A number out of its range, a dictionary that is no AprilTag family, or more tags than it has.
+
+    Examples
+    --------
+    >>> AprilGrid(6, 6, tag_m=0.03, spacing_ratio=0.3, dictionary="DICT_APRILTAG_36h11").point_count
+    144
     """
 
     family: ClassVar[str] = "aprilgrid"

@@ -43,6 +43,11 @@ class ArucoGrid(Numbered, MarkerCorners):
     ------
     InputError
         A number out of its range, an unknown dictionary or one with too few markers.
+
+    Examples
+    --------
+    >>> ArucoGrid(4, 3, marker_m=0.04, separation_m=0.004, dictionary="DICT_5X5_250").point_count
+    48
     """
 
     family: ClassVar[str] = "aruco_grid"

@@ -38,6 +38,11 @@ class ArucoMarker(MarkerCorners):
     ------
     InputError
         A number out of its range, or an unknown dictionary.
+
+    Examples
+    --------
+    >>> ArucoMarker(marker_m=0.1, dictionary="DICT_ARUCO_ORIGINAL", id=582).points[2].tolist()
+    [0.1, 0.1, 0.0]
     """
 
     family: ClassVar[str] = "aruco_marker"

@@ -43,6 +43,11 @@ class Charuco(Numbered):
     ------
     InputError
         A number out of its range, an unknown dictionary or one with too few markers.
+
+    Examples
+    --------
+    >>> Charuco(5, 7, square_m=0.03, marker_m=0.022, dictionary="DICT_5X5_100").point_count
+    24
     """
 
     family: ClassVar[str] = "charuco"

@@ -28,6 +28,11 @@ class Chessboard(Target):
     ------
     InputError
         A number out of its range.
+
+    Examples
+    --------
+    >>> Chessboard(rows=6, columns=9, pitch_m=0.025).points.shape
+    (54, 3)
     """
 
     family: ClassVar[str] = "chessboard"

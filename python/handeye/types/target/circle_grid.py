@@ -42,6 +42,11 @@ class CircleGrid(Target):
     ------
     InputError
         A number out of its range, circles that touch, or a marked circle that is not larger.
+
+    Examples
+    --------
+    >>> CircleGrid(7, 10, pitch_m=0.02, diameter_m=0.01, marked=0, marked_diameter_m=0.015).point_count
+    70
     """
 
     family: ClassVar[str] = "circle_grid"

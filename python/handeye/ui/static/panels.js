@@ -9,7 +9,7 @@ const PHASES = { start: "a small turn about where the arm stands", plan: "the vi
 let live = null, picked = null, tell = () => {}, drawn = 0;
 
 function state(d) {
-  if (d.kind === "still") return `${d.views} views, model ${d.model}.`;
+  if (d.kind === "still") return d.cameras > 1 ? `${d.cameras} cameras, ${d.views} stations.` : `${d.views} views, model ${d.model}.`;
   if (d.end) return `Ended: ${d.end.sentence}.`;
   const next = d.label ? `${d.label}: ${PHASES[d.phase] ?? d.phase}${typeof d.gain === "number" ? `, predicted gain ${figures(d.gain)} nats` : ""}` : "";
   if (d.state === "waiting") return `Next is ${next}. Waiting for you.`;
@@ -50,6 +50,12 @@ function paint(d, source) {
   image.onload = () => finish(image); image.onerror = () => finish(null); image.src = source;
 }
 
+function coverage({ name, cells }) {
+  const all = cells.flat(), most = Math.max(1, ...all), empty = all.filter((n) => n === 0).length, of = name ? ` of ${name}` : "";
+  const drawn = cells.flatMap((row, y) => row.map((n, x) => `<rect x="${x}" y="${y}" width=".94" height=".94" fill="${n ? colour(0.25 + 0.75 * n / most) : "#e3e8ec"}"/>`)).join("");
+  return `<div><svg viewBox="0 0 8 6" role="img" aria-label="Where in the picture${of} the target was seen">${drawn}</svg><span>Points seen in ${all.length - empty} of ${all.length} parts of the picture${of}${empty ? "; grey parts have none yet" : ""}.</span></div>`;
+}
+
 export const panels = {
   onPick(call) { tell = call; },
   complain(text) { this.trouble = text; $("failure").textContent = text; $("failure").hidden = !text; },
@@ -67,6 +73,7 @@ export const panels = {
       const last = d.last?.failure && d.last.failure !== "withdrawn" ? `${d.last.label}: ${d.last.detail}` : "";
       $("failure").textContent = last; $("failure").hidden = !last;
     }
+    document.body.classList.toggle("still", !d.drives);
     if (!d.drives) { $("buttons").hidden = $("take-over").hidden = $("people").hidden = true; return; }
     const waiting = d.state === "waiting", ended = Boolean(d.end);
     const may = { go: waiting, run_on: waiting, skip: waiting, here: waiting, withdraw: (waiting || ended) && d.views > 0, finish: waiting || ended, pause: !waiting && !ended && d.pace === "on" };
@@ -96,14 +103,12 @@ export const panels = {
       return element("tr", {}, element("td", {}, show), element("td", { textContent: v.points }), element("td", { textContent: v.rmse_px === null ? "" : v.rmse_px.toFixed(3) }), element("td", {}, status?.drives ? bad : ""));
     }));
     $("rejected").replaceChildren(...d.rejected.map((r) => element("li", { textContent: `${r.name}: ${r.why}` })));
-    const most = Math.max(1, ...d.coverage.flat()), empty = d.coverage.flat().filter((n) => n === 0).length, all = d.coverage.flat().length;
-    const cells = d.coverage.flatMap((row, y) => row.map((n, x) => `<rect x="${x}" y="${y}" width=".94" height=".94" fill="${n ? colour(0.25 + 0.75 * n / most) : "#e3e8ec"}"/>`)).join("");
-    $("coverage").innerHTML = d.views.length ? `<svg viewBox="0 0 8 6" role="img" aria-label="Where in the picture the target was seen">${cells}</svg><span>Points seen in ${all - empty} of ${all} parts of the picture${empty ? "; grey parts have none yet" : ""}.</span>` : "";
+    $("coverage").innerHTML = d.views.length ? d.coverage.map(coverage).join("") : "";
     if (picked) this.pick(picked);
   },
 
   async pick(name) {
-    picked = name; tell(name); $("live").hidden = !live && !picked;
+    picked = name; tell(name); $("live").hidden = !live;
     $("live").onclick = () => { picked = null; tell(null); $("live").hidden = true; this.picture(live); };
     const answer = await fetch(`view/${encodeURIComponent(name)}`);
     if (!answer.ok) { picked = null; return; }
@@ -125,11 +130,13 @@ export const panels = {
     if (scene?.goal) add("#d0660a", "where it should go ");
     if (candidates?.poses.length) { add(colour(0), "little"); add(colour(1), "much gained "); }
     if (candidates?.ruled_out.length) add("#8a97a3", "ruled out (x) ");
-    for (const e of scene?.ellipsoids ?? []) add("#a3007a", `95 % ellipsoid of ${e.name}, ${e.magnification} times larger (${e.longest_mm.toPrecision(2)} mm) `);
+    const drawn = (scene?.ellipsoids ?? []).map((e) => `${e.name} (longest half axis ${figures(e.longest_mm)} mm) ${e.magnification} times larger`);
+    if (drawn.length) add("#a3007a", `95 % ellipsoids: ${drawn.join(", ")}`);
     $("legend").replaceChildren(...parts);
   },
 
   candidates(d) {
+    $("candidates").parentElement.hidden = !d.poses.length && !d.ruled_out.length;
     const order = d.gains.map((g, i) => [g, i]).filter(([g]) => g !== null).sort((a, b) => b[0] - a[0]).slice(0, 10);
     const counts = d.reasons.map((r, k) => `${r}: ${d.reason_of.filter((x) => x === k).length}`);
     $("candidates").replaceChildren(

@@ -74,9 +74,7 @@ export class Scene {
     this.cx = w / 2; this.cy = h / 2; this.k = 0.46 * Math.min(w, h * 1.25) / this.reach * this.zoom;
     g.clearRect(0, 0, w, h);
     g.lineJoin = g.lineCap = "round"; g.lineWidth = 1.2 * this.ratio;
-    this.placed = [];
-    this.floor(g);
-    this.clouds(g);
+    this.background(g, w, h);
     const s = this.scene;
     if (!s) return;
     const items = [];
@@ -84,12 +82,43 @@ export class Scene {
     for (const board of s.boards) this.board(items, board);
     items.sort((a, b) => a.near - b.near);
     for (const item of items) item.paint(g);
-    for (const view of s.views) this.frustum(g, view.pose, 0.05, view.name === this.marked ? RED : BLUE, view.name === this.marked ? 2.5 : 1.2, view.name);
-    for (const camera of s.cameras) this.frustum(g, camera.pose, 0.09, "#16202b", 2.4, camera.name);
-    if (s.goal) this.frustum(g, s.goal, 0.09, "#d0660a", 2.4, "where it should go");
+    for (const view of s.views) this.frustum(g, view, 0.055 * this.reach, view.name === this.marked ? RED : BLUE, view.name === this.marked ? 2.5 : 1.2, view.name);
+    for (const camera of s.cameras) this.frustum(g, camera, 0.1 * this.reach, "#16202b", 2.4, camera.name);
+    if (s.goal) this.frustum(g, s.goal, 0.1 * this.reach, "#d0660a", 2.4, "where it should go");
     for (const e of s.ellipsoids) this.ellipsoid(g, e);
+    if (s.cameras.length > 1 || s.boards.length > 1) this.names(g, [...s.cameras, ...s.boards]);
     if (s.flange && !s.arm) this.axes(g, s.flange);
     this.axes(g, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]);
+  }
+
+  // Names of cameras and targets, each below the last one that it would cover.
+  names(g, things) {
+    g.font = `${12 * this.ratio}px system-ui, "DejaVu Sans", sans-serif`;
+    const taken = [], high = 14 * this.ratio;
+    for (const thing of things) {
+      let [x, y] = this.project([thing.pose[3], thing.pose[7], thing.pose[11]]);
+      const wide = g.measureText(thing.name).width + 6 * this.ratio;
+      x = Math.min(Math.max(x + 10 * this.ratio, 0), this.canvas.width - wide);
+      while (taken.some(([a, b, w]) => x < a + w && a < x + wide && Math.abs(y - b) < high)) y += high;
+      taken.push([x, y, wide]);
+      g.fillStyle = "rgba(255,255,255,.85)"; g.fillRect(x - 3 * this.ratio, y - high * 0.8, wide, high);
+      g.fillStyle = "#16202b"; g.fillText(thing.name, x, y);
+    }
+  }
+
+  // Floor and candidates stay as painted until the cell is turned or they change: thousands take their time.
+  background(g, w, h) {
+    const drawnFor = [w, h, this.azimuth, this.elevation, this.k, ...this.middle].join();
+    if (this.behind?.drawnFor !== drawnFor || this.behind.candidates !== this.candidates) {
+      const canvas = Object.assign(document.createElement("canvas"), { width: w, height: h }), b = canvas.getContext("2d");
+      b.lineJoin = b.lineCap = "round"; b.lineWidth = 1.2 * this.ratio;
+      this.placed = [];
+      this.floor(b);
+      this.clouds(b);
+      this.behind = { canvas, drawnFor, candidates: this.candidates, placed: this.placed };
+    }
+    g.drawImage(this.behind.canvas, 0, 0);
+    this.placed = [...this.behind.placed];
   }
 
   floor(g) {
@@ -115,11 +144,11 @@ export class Scene {
       this.placed.push([x, y, `ruled out: ${c.reasons[c.reason_of[i]]}`]);
     });
     g.stroke();
-    const size = c.poses.length > 1500 ? 0.018 : 0.03, buckets = Array.from({ length: 8 }, () => []);
+    const size = (c.poses.length > 1500 ? 0.02 : 0.033) * this.reach, buckets = Array.from({ length: 8 }, () => []);
     c.gains.forEach((gain, i) => buckets[gain === null ? 0 : Math.round(7 * this.share(gain))].push(i));
     buckets.forEach((bucket, b) => {
       g.strokeStyle = colour(b / 7); g.globalAlpha = 0.35 + 0.6 * b / 7; g.beginPath();
-      for (const i of bucket) this.outline(g, c.poses[i], size, `${c.names[i]}: gain ${c.gains[i]?.toFixed(3) ?? "unknown"}`);
+      for (const i of bucket) this.outline(g, c.poses[i], c.sight, size, `${c.names[i]}: gain ${c.gains[i]?.toFixed(3) ?? "unknown"}`);
       g.stroke();
     });
     g.globalAlpha = 1;
@@ -157,8 +186,8 @@ export class Scene {
     } });
   }
 
-  outline(g, pose, size, name) {
-    const inHand = this.scene?.mounting !== "eye_to_hand", [ox, oy] = this.scene?.opening ?? [0.5, 0.4];
+  outline(g, pose, sight, size, name) {
+    const inHand = Boolean(sight), [ox, oy] = sight ?? [0, 0];
     const at = this.project([pose[3], pose[7], pose[11]]);
     this.placed.push([at[0], at[1], name]);
     // A camera is a pyramid that opens along z; a target a square with its normal.
@@ -168,8 +197,8 @@ export class Scene {
     for (const p of c) g.lineTo(p[0], p[1]);
     for (const p of inHand ? c : [this.project(mul(pose, [0, 0, -size]))]) { g.moveTo(at[0], at[1]); g.lineTo(p[0], p[1]); }
   }
-  frustum(g, pose, size, stroke, width, name) {
-    g.strokeStyle = stroke; g.lineWidth = width * this.ratio; g.beginPath(); this.outline(g, pose, size, name); g.stroke();
+  frustum(g, thing, size, stroke, width, name) {
+    g.strokeStyle = stroke; g.lineWidth = width * this.ratio; g.beginPath(); this.outline(g, thing.pose, thing.sight, size, name); g.stroke();
   }
 
   ellipsoid(g, e) {
@@ -187,7 +216,8 @@ export class Scene {
     this.placed.push([x, y, `95 % ellipsoid of ${e.name}: longest half axis ${e.longest_mm.toPrecision(2)} mm, drawn ${e.magnification} times larger`]);
   }
   axes(g, m) {
-    [["#b3140f", [0.08, 0, 0]], ["#1a6f3c", [0, 0.08, 0]], ["#0b5cad", [0, 0, 0.08]]].forEach(([stroke, p]) => {
+    [["#b3140f", 0], ["#1a6f3c", 1], ["#0b5cad", 2]].forEach(([stroke, axis]) => {
+      const p = [0, 0, 0]; p[axis] = 0.09 * this.reach;
       g.strokeStyle = stroke; g.lineWidth = 2 * this.ratio; g.beginPath(); this.path(g, [mul(m, [0, 0, 0]), mul(m, p)]); g.stroke();
     });
   }

@@ -7,6 +7,9 @@ pub struct Assumptions {
     pub exact_robot: bool,
     /// What a deviation of one means for each joint: radians, metres.
     pub joint_scales: Vec<f64>,
+    /// How many times rougher the arm is than those that priors are about, at least one: an arm that is rough in what
+    /// residuals show is believed to be as rough in constant errors that hide.
+    pub roughness: f64,
     /// Joints whose offset is a parameter: all but those that only say where base and flange are.
     pub free_joints: Vec<usize>,
     /// Whether each way of displacing a joint on its link is in metres.

@@ -2,9 +2,9 @@
 
 use super::Component;
 use crate::estimation::cell::{CameraPrior, Cell};
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// A plain inverse of J'J is too small by about this factor in deviation.
 const USUAL_INFLATION: f64 = 1.1;

@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::{Linearisation, Rows};
-use crate::estimation::mixed::{Effect, Term};
 
 /// White noise of the target's position across and along the line of sight, and of its rotation.
 pub(in crate::estimation) struct Detector;
@@ -25,8 +25,9 @@ impl Component for Detector {
 
     fn levels(&self) -> Vec<Level> {
         let degree = 1_f64.to_radians();
+        // No detector is exact: a part that the residuals do not show is believed small before it is believed nothing.
         let deviation =
-            |size: f64, nothing: f64| LevelPrior::Deviation { size, exponent: 0.02, tail: 1.0, nothing };
+            |size: f64, nothing: f64| LevelPrior::Deviation { size, exponent: 0.3, tail: 1.0, nothing };
         vec![
             Level { name: "detector_across_m", start: 2e-4, prior: deviation(2e-3, 1e-6) },
             // Depth is what pictures know least.

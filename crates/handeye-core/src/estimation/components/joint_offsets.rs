@@ -4,18 +4,19 @@ use nalgebra::DMatrix;
 
 use super::{Arm, Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// Offsets of the joints between the first and the last, which only say where base and flange are.
 pub(in crate::estimation) struct JointOffsets {
     offsets: Vec<DMatrix<f64>>,
+    roughness: f64,
 }
 
 impl JointOffsets {
-    pub(in crate::estimation) fn new(arm: &Arm) -> Self {
-        Self { offsets: arm.offsets.clone() }
+    pub(in crate::estimation) fn new(arm: &Arm, roughness: f64) -> Self {
+        Self { offsets: arm.offsets.clone(), roughness }
     }
 }
 
@@ -28,9 +29,9 @@ impl Component for JointOffsets {
         let degree = 1_f64.to_radians();
         vec![Level {
             name: "offset_rad",
-            start: 0.01 * degree,
+            start: 0.01 * degree * self.roughness,
             prior: LevelPrior::Deviation {
-                size: 0.07 * degree,
+                size: 0.07 * degree * self.roughness,
                 exponent: 0.35,
                 tail: 1.0,
                 nothing: 1e-6 * degree,

@@ -4,19 +4,20 @@ use nalgebra::DMatrix;
 
 use super::{Arm, Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// Displacements in metres and tilts in radians, each with a level of its own.
 pub(in crate::estimation) struct Links {
     lengths: Vec<DMatrix<f64>>,
     angles: Vec<DMatrix<f64>>,
+    roughness: f64,
 }
 
 impl Links {
-    pub(in crate::estimation) fn new(arm: &Arm) -> Self {
-        Self { lengths: arm.lengths.clone(), angles: arm.angles.clone() }
+    pub(in crate::estimation) fn new(arm: &Arm, roughness: f64) -> Self {
+        Self { lengths: arm.lengths.clone(), angles: arm.angles.clone(), roughness }
     }
 }
 
@@ -30,14 +31,19 @@ impl Component for Links {
         vec![
             Level {
                 name: "link_m",
-                start: 1e-4,
-                prior: LevelPrior::Deviation { size: 7e-4, exponent: 0.42, tail: 1.0, nothing: 1e-8 },
+                start: 1e-4 * self.roughness,
+                prior: LevelPrior::Deviation {
+                    size: 7e-4 * self.roughness,
+                    exponent: 0.42,
+                    tail: 1.0,
+                    nothing: 1e-8,
+                },
             },
             Level {
                 name: "link_rad",
-                start: 0.005 * degree,
+                start: 0.005 * degree * self.roughness,
                 prior: LevelPrior::Deviation {
-                    size: 0.04 * degree,
+                    size: 0.04 * degree * self.roughness,
                     exponent: 0.42,
                     tail: 1.0,
                     nothing: 1e-6 * degree,

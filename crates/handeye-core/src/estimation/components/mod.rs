@@ -2,6 +2,7 @@
 
 mod arm;
 mod assumptions;
+mod backlash;
 mod board;
 mod camera;
 mod detector;
@@ -35,7 +36,7 @@ fn of_pictures(cell: &Cell) -> Vec<Box<dyn Component>> {
         }
     }
     if cell.board_scale {
-        all.push(Box::new(board::BoardScale));
+        all.push(Box::new(board::BoardScale { touched: !cell.touches.is_empty() }));
     }
     if let Some(detector) = detector::Detector::of(cell) {
         all.push(Box::new(detector));
@@ -57,11 +58,12 @@ pub(super) fn all(cell: &Cell, assumptions: &Assumptions) -> Result<Vec<Box<dyn 
     }
     if let Some(arm) = Arm::of(cell, assumptions)? {
         all.push(Box::new(joint_noise::JointNoise::new(&arm)));
-        all.push(Box::new(joint_offsets::JointOffsets::new(&arm)));
-        all.push(Box::new(links::Links::new(&arm)));
+        all.push(Box::new(joint_offsets::JointOffsets::new(&arm, assumptions.roughness)));
+        all.push(Box::new(links::Links::new(&arm, assumptions.roughness)));
+        all.extend(backlash::Backlash::of(cell).map(|one| Box::new(one) as Box<dyn Component>));
     } else {
-        all.push(Box::new(posture::Posture::flange(cell)));
-        all.push(Box::new(posture::Posture::base(cell)));
+        all.push(Box::new(posture::Posture::flange(cell, assumptions.roughness)));
+        all.push(Box::new(posture::Posture::base(cell, assumptions.roughness)));
     }
     Ok(all)
 }

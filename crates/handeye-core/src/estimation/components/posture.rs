@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::{Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::{Linearisation, Rows};
-use crate::estimation::mixed::{Effect, Term};
 
 /// Flange poses further apart than this have little of an error in common; a chord of 2 is half a turn.
 const LIKENESS_M: f64 = 1.0;
@@ -32,6 +32,10 @@ struct Beliefs {
 const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.26, lever_m: 0.4 };
 /// Shoulders and mountings carry the whole reach.
 const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.6, lever_m: 1.0 };
+/// Of an arm that is known by a list of poses alone nobody has said that it was ever calibrated, and its pictures, which
+/// would tell what is the detector's, are not there.
+const AT_FLANGE_UNSEEN: Beliefs = Beliefs { size_deg: 0.16, ..AT_FLANGE };
+const AT_BASE_UNSEEN: Beliefs = Beliefs { size_deg: 0.08, ..AT_BASE };
 /// Functions that carry less of the variance than this count as each station's own.
 const SMALLEST_FUNCTION: f64 = 1e-4;
 /// So do all but the largest: where stations have little in common there are as many functions as stations, and each
@@ -50,25 +54,32 @@ pub(in crate::estimation) struct Posture {
     functions: DMatrix<f64>,
     /// Root of the share of the variance that is each station's own.
     own: Vec<f64>,
+    roughness: f64,
 }
 
 impl Posture {
     /// At the flange.
-    pub fn flange(cell: &Cell) -> Self {
+    pub fn flange(cell: &Cell, roughness: f64) -> Self {
         Self::new(
             cell,
             "posture_flange",
             ["posture_flange_rad", "posture_flange_lever_m"],
-            &AT_FLANGE,
+            if cell.is_unseen() { &AT_FLANGE_UNSEEN } else { &AT_FLANGE },
             |rows| &rows.flange,
+            roughness,
         )
     }
 
     /// At the base.
-    pub fn base(cell: &Cell) -> Self {
-        Self::new(cell, "posture_base", ["posture_base_rad", "posture_base_lever_m"], &AT_BASE, |rows| {
-            &rows.base
-        })
+    pub fn base(cell: &Cell, roughness: f64) -> Self {
+        Self::new(
+            cell,
+            "posture_base",
+            ["posture_base_rad", "posture_base_lever_m"],
+            if cell.is_unseen() { &AT_BASE_UNSEEN } else { &AT_BASE },
+            |rows| &rows.base,
+            roughness,
+        )
     }
 
     fn new(
@@ -77,6 +88,7 @@ impl Posture {
         levels: [&'static str; 2],
         beliefs: &'static Beliefs,
         rows: fn(&Rows) -> &DMatrix<f64>,
+        roughness: f64,
     ) -> Self {
         let eigen = SymmetricEigen::new(likeness(cell, beliefs.same_everywhere));
         let count = cell.stations.len();
@@ -88,7 +100,7 @@ impl Posture {
             eigen.eigenvectors[(k, kept[j])] * (eigen.eigenvalues[kept[j]] * (1.0 - OWN_SHARE)).sqrt()
         });
         let own = (0..count).map(|k| (1.0 - functions.row(k).norm_squared()).max(OWN_SHARE).sqrt()).collect();
-        Self { name, beliefs, levels, rows, functions, own }
+        Self { name, beliefs, levels, rows, functions, own, roughness }
     }
 }
 
@@ -115,9 +127,9 @@ impl Component for Posture {
         vec![
             Level {
                 name: self.levels[0],
-                start: 0.006 * degree,
+                start: 0.006 * degree * self.roughness,
                 prior: LevelPrior::Deviation {
-                    size: self.beliefs.size_deg * degree,
+                    size: self.beliefs.size_deg * degree * self.roughness,
                     exponent: self.beliefs.exponent,
                     tail: 2.0,
                     nothing: 1e-6 * degree,

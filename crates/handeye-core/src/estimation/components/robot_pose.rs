@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::{Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::{Linearisation, Rows};
-use crate::estimation::mixed::{Effect, Term};
 
 /// White noise of the robot's poses: rotation, and translation as rotation times a lever.
 pub(in crate::estimation) struct RobotPose {

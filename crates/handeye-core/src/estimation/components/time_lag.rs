@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::{Component, per_station};
 use crate::estimation::cell::Cell;
+use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::Linearisation;
-use crate::estimation::mixed::{Effect, Term};
 
 /// One lag for all pictures, seconds.
 pub(in crate::estimation) struct TimeLag;

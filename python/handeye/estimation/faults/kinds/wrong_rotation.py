@@ -1,15 +1,25 @@
 """Rotations that were written in one way and read in another."""
 
-import itertools
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
 
 from handeye.estimation.faults.kinds.base import Handling, Hypothesis, Kind, of_poses
+from handeye.estimation.faults.kinds.numbers import (
+    DEGREES,
+    RADIANS,
+    TURNS,
+    Numbers,
+    angles_between,
+    choose,
+    in_degrees,
+    rotation_of,
+)
 from handeye.estimation.measurements import Measurements
-from handeye.notations import EULER, MAKERS, NOTATIONS, Notation, Unit
-from handeye.notations.forms import Euler, Rotation, Vector
+from handeye.notations import EULER, MAKERS, Notation
+from handeye.notations.forms import Euler
 from handeye.types.arrays import FloatArray
 from handeye.types.pose import Pose
 
@@ -24,9 +34,10 @@ KIND = Kind(
     "writes the poses read in the convention that agrees",
 )
 HINT = "state how the poses are written (--notation), or write them as matrices T_base_flange in metres"
-# What is written seldom, by this logarithm.
-SELDOM, ODD = -4.0, -7.0
-_USUAL = ("ur", "kuka", "fanuc", "staubli", "doosan")
+# What is written less often than poses inverted, by this logarithm: by more than chance makes of readings
+# that a pan-tilt unit leaves alike. Of odd ways there are over a thousand.
+USUAL, SELDOM, ODD = -8.0, -9.0, -15.0
+_USUAL = (RADIANS.name, DEGREES.name, "kuka", "fanuc", "staubli", "doosan")
 _AXES = "xyz"
 _SIGNS = (
     ((-1.0, -1.0, -1.0), "all"),
@@ -40,9 +51,8 @@ Readings = Callable[[FloatArray], FloatArray]
 
 def hypotheses(measurements: Measurements) -> Iterator[Hypothesis]:
     """Yield every other way to read the rotations."""
-    del measurements
     for name, sentence, poses in _PLAIN:
-        yield of_poses(KIND, name, sentence, HINT, poses)
+        yield of_poses(KIND, name, sentence, HINT, poses, log_prior=USUAL)
     for axis in range(3):
         yield of_poses(
             KIND,
@@ -61,23 +71,36 @@ def hypotheses(measurements: Measurements) -> Iterator[Hypothesis]:
             partial(_signed_positions, signs=np.array(signs)),
             log_prior=SELDOM,
         )
+    robot = np.array([view.T_base_flange.matrix for view in measurements.views]).reshape(-1, 4, 4)
+    cameras = measurements.camera_poses[:, :3, :3]
+    seen = angles_between(cameras, cameras)
     every = forms()
     for given in every:
         numbers = Numbers(given)
-        for meant, beyond in itertools.product(every, (False, True)):
-            if given is meant or (beyond and not isinstance(numbers.rotation, Euler)):
+        for meant in (RADIANS, *every):
+            if given is meant or {given, meant} == {RADIANS, DEGREES}:
                 continue
             usual = given.name in _USUAL and meant.name in _USUAL
             yield of_poses(
                 KIND,
-                f"{meant.name}_for_{given.name}" + ("_beyond" if beyond else ""),
-                f"the robot's rotations are {words_of(meant)} and were read as {words_of(given)}",
+                f"{meant.name}_for_{given.name}",
+                _sentence(given, meant),
                 HINT,
-                partial(numbers.read_as, meant=meant, beyond=beyond),
-                log_prior=0.0 if usual else ODD,
+                _either(robot, partial(numbers.read_as, meant=meant), seen),
+                log_prior=USUAL if usual else ODD,
             )
-        if given.name == "ur":
+        if given is DEGREES:
             continue  # With all signs turned it is the transpose.
+        if given.name in _USUAL:
+            yield of_poses(
+                KIND,
+                f"{given.name}_for_{RADIANS.name}",
+                f"the robot's rotations are {words_of(given)} in degrees and were read as rotation vectors "
+                "in radians",
+                HINT,
+                in_degrees(given, robot, seen),
+                log_prior=-len(robot) * math.log(len(TURNS)),
+            )
         for signs, which in _SIGNS:
             yield of_poses(
                 KIND,
@@ -89,48 +112,31 @@ def hypotheses(measurements: Measurements) -> Iterator[Hypothesis]:
             )
 
 
-class Numbers:
-    """What was written, if poses were read in a notation; the numbers of the last poses are kept."""
+def _either(robot: FloatArray, read_as: Callable[..., FloatArray], seen: FloatArray) -> Readings:
+    """Return what is meant if each pose may stand for either of two sets of numbers."""
+    both = np.stack([read_as(robot), read_as(robot, beyond=True)], axis=1)
+    if np.allclose(both[:, 0], both[:, 1], atol=1e-9):
+        return read_as
+    return choose(robot, both, read_as, seen)
 
-    def __init__(self, given: Notation) -> None:
-        self._given = given
-        self._poses: FloatArray | None = None
-        self._rows: FloatArray = np.zeros((0, 6))
 
-    @property
-    def rotation(self) -> Rotation | None:
-        """How rotations are written."""
-        return self._given.form.rotation if isinstance(self._given.form, Vector) else None
-
-    def read_as(
-        self,
-        poses: FloatArray,
-        *,
-        meant: Notation,
-        factors: tuple[float, ...] = (1.0, 1.0, 1.0),
-        beyond: bool = False,
-    ) -> FloatArray:
-        """Return poses (K, 4, 4) of the same numbers in another notation, times factors.
-
-        Two triples of angles stand for one rotation; `beyond` takes that whose second angle is larger.
-        """
-        if self._poses is not poses:
-            self._rows = np.array([self._given.numbers(Pose(pose), Unit.M) for pose in poses])
-            self._poses = poses
-        rows = self._rows.copy()
-        if beyond and isinstance(self.rotation, Euler):
-            half = 180.0 if self.rotation.degrees else np.pi
-            proper = self.rotation.axes[0] == self.rotation.axes[2]
-            rows[:, 3] -= half * np.where(rows[:, 3] > 0, 1, -1)
-            rows[:, 5] -= half * np.where(rows[:, 5] > 0, 1, -1)
-            rows[:, 4] = -rows[:, 4] if proper else half * np.where(rows[:, 4] < 0, -1, 1) - rows[:, 4]
-        rows[:, 3:6] *= factors
-        return meant.matrices(rows, Unit.M)
+def _sentence(given: Notation, meant: Notation) -> str:
+    """Say what was taken for what; numbers in the reverse order are so both ways."""
+    one, other = rotation_of(given), rotation_of(meant)
+    or_so = ""
+    if isinstance(one, Euler) and isinstance(other, Euler):
+        reverse = one.axes == other.axes[::-1] and one.moving != other.moving
+        or_so = ", or the other way round" if reverse else ""
+    units = (" in radians", " in degrees") if meant is RADIANS else ("", "")
+    return (
+        f"the robot's rotations are {words_of(meant)}{units[0]} and were read as {words_of(given)}{units[1]}"
+        f"{or_so}"
+    )
 
 
 def words_of(notation: Notation) -> str:
     """Say how a notation writes rotations."""
-    rotation = notation.form.rotation if isinstance(notation.form, Vector) else None
+    rotation = rotation_of(notation)
     if not isinstance(rotation, Euler):
         return "rotation vectors"
     how = "moving" if rotation.moving else "fixed"
@@ -142,11 +148,11 @@ def words_of(notation: Notation) -> str:
 
 
 def forms() -> tuple[Notation, ...]:
-    """Return the rotation vector and all angles in degrees, those of the makers first."""
+    """Return the rotation vector and all angles, in degrees, those of the makers first."""
     usual = {maker.form: maker for maker in reversed(MAKERS) if maker.name in _USUAL}
-    named = [n for n in usual.values() if n.name != "ur"]
+    named = [n for n in usual.values() if n is not RADIANS]
     others = [n for n in EULER if n.name.endswith("_deg") and n.form not in usual]
-    return (NOTATIONS["ur"], *reversed(named), *others)
+    return (DEGREES, *reversed(named), *others)
 
 
 def _transposed(poses: FloatArray) -> FloatArray:

@@ -5,8 +5,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from handeye.estimation.faults.kinds.base import Handling, Hypothesis, Kind, SharedFaultError, of_poses
-from handeye.estimation.faults.kinds.wrong_rotation import Numbers, forms, words_of
+from handeye.estimation.faults.kinds.numbers import DEGREES, TURNS, Numbers, angles_between, in_degrees
+from handeye.estimation.faults.kinds.wrong_rotation import forms, words_of
 from handeye.estimation.faults.scale import pitch_of, reach_of, scale_of
 from handeye.estimation.measurements import Measurements
 from handeye.types.arrays import FloatArray
@@ -17,7 +20,7 @@ KIND = Kind(
     "wrong_unit",
     "lengths or angles in another unit",
     "Positions of the robot in millimetres, centimetres or inches, the board's measures in millimetres, or "
-    "angles in radians read as degrees.",
+    "angles in radians read as degrees or the other way round.",
     "Rotations agree, and robot and pictures differ by the factor of a unit; whichever then has an unusual "
     "size is blamed. Where both are in one wrong unit only their size shows it.",
     Handling.REFUSED,
@@ -82,6 +85,16 @@ def hypotheses(measurements: Measurements) -> Iterator[Hypothesis]:
             "convert the angles, or name their unit",
             partial(Numbers(given).read_as, meant=given, factors=(DEGREES_PER_RADIAN,) * 3),
         )
+    robot = np.array([view.T_base_flange.matrix for view in measurements.views])
+    cameras = measurements.camera_poses[:, :3, :3]
+    yield of_poses(
+        KIND,
+        "degrees",
+        "the robot's rotation vectors are in degrees and were read as radians",
+        "convert the angles, or name their unit",
+        in_degrees(DEGREES, robot, angles_between(cameras, cameras)),
+        log_prior=-len(robot) * math.log(len(TURNS)),
+    )
 
 
 def _of_unit(measurements: Measurements, factor: float, unit: str, metres: float) -> Iterator[Hypothesis]:
