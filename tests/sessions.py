@@ -3,17 +3,25 @@
 import os
 import signal
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from handeye.robots.protocol import Goal
 from handeye.robots.simulated import ArmErrors
+from handeye.session.attempt import Cell, Missed, Seen, arrive, look
 from handeye.session.configuration import begin, go_on, prepare
 from handeye.session.loop import End
-from handeye.session.settings import Configuration, Simulation
+from handeye.session.rig import RigEnd
+from handeye.session.rig_prepared import begin_rig, go_on_rig, is_rig_session
+from handeye.session.rig_store import open_rig_session
+from handeye.session.settings import Configuration, RigSettings, Simulation
 from handeye.session.store import is_session, open_session
+from handeye.studies.rig_cell import rig_cell
+from handeye.types import Recording, RigRecording
 
 QUICK = Configuration("epson_c4l", simulation=Simulation(points_only=0.1))
 
@@ -26,6 +34,14 @@ def configured(seed: int = 0, errors: ArmErrors | None = None, **changes: Any) -
     if errors is not None:
         simulation = replace(simulation, errors=errors)
     return replace(QUICK, seed=seed, simulation=simulation, **changed)
+
+
+def attempt(cell: Cell, goal: Goal, digests: frozenset[str] = frozenset()) -> Seen | Missed:
+    """Go to a goal and look at the one target through the one camera."""
+    arrived = arrive(cell, goal, None, {})
+    if isinstance(arrived, Missed):
+        return arrived
+    return look(cell, cell.eyes[0], goal.label, digests, {}, None)
 
 
 def run(configuration: Configuration, folder: Path) -> End:
@@ -45,15 +61,15 @@ class Outcome:
     """Everything that must not depend on breaks."""
 
     journal: list[dict[str, Any]]
-    recording: dict[str, Any]
+    recording: Recording | RigRecording
     images: dict[str, bytes]
 
     @classmethod
     def of(cls, folder: Path) -> "Outcome":
-        store = open_session(folder)
+        store = open_rig_session(folder) if is_rig_session(folder) else open_session(folder)
         try:
             journal = [entry.to_dict() for entry in store.entries]
-            recording = store.recording.to_dict()
+            recording = store.recording
         finally:
             store.close()
         for entry in journal:
@@ -62,7 +78,30 @@ class Outcome:
         return cls(journal, recording, images)
 
 
-def run_killed(configuration: Configuration, folder: Path, random: np.random.Generator, mean_s: float) -> int:
+RIG = Configuration(
+    "ur5e", accuracy_mm=None, accuracy_deg=None, most_views=7, seed=3, rig=RigSettings(candidates=60)
+)
+
+
+def run_rig(configuration: Configuration, folder: Path) -> RigEnd:
+    """Run a simulated rig to the end, from the beginning or from where it broke off."""
+    if is_session(folder):
+        session, store, _ = go_on_rig(folder, rig_cell)
+    else:
+        session, store = begin_rig(rig_cell(configuration), folder)
+    try:
+        return session.run()
+    finally:
+        store.close()
+
+
+def run_killed(
+    configuration: Configuration,
+    folder: Path,
+    random: np.random.Generator,
+    mean_s: float,
+    runner: Callable[[Configuration, Path], object] = run,
+) -> int:
     """Run to the end in processes that are killed after a random time each; return the number of kills."""
     kills = 0
     while True:
@@ -70,7 +109,7 @@ def run_killed(configuration: Configuration, folder: Path, random: np.random.Gen
         if child == 0:
             code = 1
             try:
-                run(configuration, folder)
+                runner(configuration, folder)
                 code = 0
             finally:
                 os._exit(code)

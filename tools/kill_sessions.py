@@ -5,7 +5,8 @@
 
 At random instants, or with `--at-writes` right before or after an fsync, a rename or an unlink, each in turn.
 Kinds: points (projected), faults (with faults of robot and camera), pictures (rendered), manual (a person who
-types poses and joints).
+types poses and joints), rig (four cameras and two boards), rig-faults (the same with faults of robot and
+cameras).
 """
 
 import argparse
@@ -32,15 +33,15 @@ from handeye.robots.simulated import SimulatedArm
 from handeye.session.configuration import begin, prepare
 from handeye.session.faults import FaultRates
 from handeye.session.loop import Session
-from handeye.session.settings import Configuration
+from handeye.session.settings import Configuration, Simulation
 from handeye.session.store import is_session, open_session
 from handeye.types import Pose
-from sessions import Outcome, configured, run
+from sessions import RIG, Outcome, configured, run, run_rig
 
-KINDS = ("points", "faults", "pictures", "manual")
+KINDS = ("points", "faults", "pictures", "manual", "rig", "rig-faults")
 # Calls into the system at which a process dies, and how many of them one view takes at most.
 WRITES = ("fsync", "replace", "rename", "unlink", "ftruncate")
-MOST_WRITES = 14
+MOST_WRITES = 24
 
 
 class Typist:
@@ -91,6 +92,11 @@ def configuration_of(kind: str, seed: int) -> Configuration:
     """Return a run of a kind."""
     if kind == "faults":
         return configured(seed, faults=FaultRates(refused=0.1, not_found=0.1, camera_fails=0.05))
+    if kind == "rig":
+        return replace(RIG, seed=seed)
+    if kind == "rig-faults":
+        rates = FaultRates(refused=0.1, robot_dies=0.05, not_found=0.1, camera_fails=0.05)
+        return replace(RIG, seed=seed, simulation=Simulation(faults=rates))
     if kind == "pictures":
         return configured(seed, points_only=None, most_views=5)
     return configured(seed)
@@ -159,7 +165,7 @@ def main() -> int:
         seed = options.seed + runs
         kind = options.kind or KINDS[runs % len(KINDS)]
         configuration = configuration_of(kind, seed)
-        runner = run_by_hand if kind == "manual" else run
+        runner = run_by_hand if kind == "manual" else run_rig if kind in {"rig", "rig-faults"} else run
         random = np.random.default_rng(seed)
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)

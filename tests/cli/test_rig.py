@@ -91,9 +91,40 @@ def test_plan_ranks_stations_by_what_all_cameras_learn(handeye: Handeye, folder:
 
 
 def test_other_commands_take_one_of_the_cameras(handeye: Handeye, folder: Path) -> None:
-    error = handeye.fails("validate", folder)
+    error = handeye.fails("doctor", folder)
     assert error["code"] == "several_cameras"
     assert "--only" in error["hint"]
     alone = handeye.json("solve", folder, "--only", "front")
     assert "T_base_camera" in alone
     assert handeye("validate", folder, "--only", "left").code == 0
+
+
+def test_report_is_one_page_about_all_cameras(handeye: Handeye, folder: Path, tmp_path: Path) -> None:
+    page = tmp_path / "rig.html"
+    data = handeye.json("report", folder, "--output", page)
+    assert list(data["cameras"]) == ["left", "right", "front", "side"]
+    assert set(data["true_error"]) == {*data["cameras"], *data["camera_to_camera"]}
+    text = page.read_text()
+    for expected in ("left: T_flange_camera", "front: T_base_camera", "T_left_right", "T_base_target"):
+        assert expected in text
+    assert "<script" not in text
+    for name in data["cameras"]:
+        radius = data["cameras"][name]["within_95"]["translation_mm"]
+        assert data["true_error"][name]["translation_mm"] < 2 * radius
+    assert handeye("report", folder, "--model", "paper", "--output", page).code == 2
+
+
+def test_validate_compares_halves_of_the_stations(handeye: Handeye, tmp_path: Path) -> None:
+    rig = simulate_rig(ErrorKind.MIXTURE_CELL, 3, RigOptions(stations=16))
+    write_rig(rig, tmp_path / "rig")
+    data = handeye.json("validate", tmp_path / "rig", "--splits", "3", "--seed", "4")
+    assert set(data["cameras"]) == {"left", "right", "front", "side"}
+    assert set(data["camera_to_camera"]) == {"T_left_right", "T_front_side"}
+    assert data["undetermined"] < data["splits"] == 3
+    for one in (*data["cameras"].values(), *data["camera_to_camera"].values()):
+        # What is stated is of the size of what differs.
+        assert 0.05 < one["halves"]["nees_per_dof"] < 10
+        assert one["truth"]["translation_mm"] < 2 * one["within_95"]["translation_mm"]
+    few = simulate_rig(ErrorKind.MIXTURE_CELL, 3, RigOptions(stations=8))
+    write_rig(few, tmp_path / "few")
+    assert handeye("validate", tmp_path / "few").code == 3

@@ -118,6 +118,8 @@ def test_solve_several_cameras(handeye: Handeye, tmp_path: Path) -> None:
         camera["target"] = target
     compare("handeye solve, several cameras", data)
     compare("handeye plan, several cameras", handeye.json("plan", tmp_path / "rig"))
+    halved = handeye.json("validate", tmp_path / "rig", "--splits", "2")
+    compare("handeye validate, several cameras", halved)
 
 
 def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
@@ -131,7 +133,9 @@ def test_solve_poses_alone(handeye: Handeye, tmp_path: Path) -> None:
 
 
 def test_demo_of_a_rig(handeye: Handeye, tmp_path: Path) -> None:
-    compare("handeye demo --rig", handeye.json("demo", "--rig", tmp_path / "rig"))
+    data = handeye.json("demo", "--rig", tmp_path / "rig")
+    data["calibration"] = {}
+    compare("handeye run --rig", data)
 
 
 def test_demo_of_a_folder(handeye: Handeye, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from handeye.errors import DeviceError, InputError
 from handeye.estimation import solve
 from handeye.robots import ArmKinematics, open_arm
 from handeye.robots.protocol import Goal
-from handeye.session.attempt import Cell, Missed, Timeouts, attempt
+from handeye.session.attempt import Cell, Missed, Timeouts
 from handeye.session.calls import Calls
 from handeye.session.choosing import ArmChooser
 from handeye.session.configuration import Prepared, begin, prepare
@@ -26,7 +26,7 @@ from handeye.session.simulated import SimulatedCell, SimulationOptions, simulate
 from handeye.session.store import SessionStore, create_session
 from handeye.session.wish import Wish
 from handeye.types import Chessboard, CircleGrid, Mounting, Pose
-from sessions import configured
+from sessions import attempt, configured
 
 
 def ended(configuration: Configuration, folder: Path) -> tuple[End, Prepared, SessionStore]:
@@ -159,8 +159,8 @@ def test_nothing_moves_outside_the_workspace_or_unconfirmed() -> None:
     stands = prepared.hidden_arm.hidden_pose
     loop_goal = _goal(prepared)
     tiny = replace(prepared.cell.workspace, upper_m=np.array([0.1, 0.1, 0.1]))
-    outside = attempt(replace(prepared.cell, workspace=tiny), loop_goal, frozenset(), {})
-    asked = attempt(replace(prepared.cell, confirm=lambda _: False), loop_goal, frozenset(), {})
+    outside = attempt(replace(prepared.cell, workspace=tiny), loop_goal)
+    asked = attempt(replace(prepared.cell, confirm=lambda _: False), loop_goal)
     for outcome, failure in ((outside, Failure.MOTION_REFUSED), (asked, Failure.NOT_CONFIRMED)):
         assert isinstance(outcome, Missed)
         assert outcome.failure is failure

@@ -1,65 +1,154 @@
 """The loop on a rig: it ends as asked, and goes on after kills and faults as if nothing had been."""
 
+import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from handeye.datasets import read_rig
 from handeye.errors import InputError
-from handeye.planning.rig import RigRequest
+from handeye.robots.protocol import Goal, Reading, Robot
+from handeye.session.deciding import EndReason
+from handeye.session.entry import Failure
 from handeye.session.faults import FaultRates
-from handeye.session.rig import RigEndReason, RigWish, open_or_create
-from handeye.studies.rig_loop import drive, judged, rig_cell
-from handeye.types import Station
-
-WISH = RigWish(request=None, most_stations=7, candidates=60, seed=3)
-
-
-class Killed(BaseException):
-    """The process is gone."""
+from handeye.session.rig_prepared import begin_rig
+from handeye.session.rig_store import open_rig_session
+from handeye.session.settings import Configuration, RigSettings, Simulation
+from handeye.studies.rig_cell import rig_cell
+from handeye.studies.rig_loop import judged
+from sessions import RIG, Outcome, run_killed, run_rig
 
 
-def test_a_request_for_all_cameras_is_met_and_kept() -> None:
-    wish = RigWish(request=RigRequest(1.5, 0.15), candidates=100)
-    cell = rig_cell(5)
-    end = drive(cell, wish)
-    assert end.reason is RigEndReason.ACCURACY_REACHED
-    run = judged(cell, end, wish)
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session of seven stations."""
+    folder = tmp_path_factory.mktemp("rig") / "finished"
+    run_rig(RIG, folder)
+    return folder
+
+
+def test_a_request_for_all_cameras_is_met_and_kept(tmp_path: Path) -> None:
+    asked = Configuration("ur5e", 5.0, 0.5, seed=6, rig=RigSettings(candidates=100))
+    prepared = rig_cell(asked)
+    session, store = begin_rig(prepared, tmp_path / "s")
+    end = session.run()
+    store.close()
+    assert end.reason is EndReason.ACCURACY_REACHED
+    assert end.calibration is not None
+    run = judged(prepared, end)
     assert set(run.inside) == {"left", "right", "front", "side"}
     assert all(run.inside.values())
 
 
-@pytest.mark.parametrize("after", [1, 4, 6])
-def test_a_run_that_is_killed_goes_on_as_if_nothing_had_been(tmp_path: Path, after: int) -> None:
-    whole = drive(rig_cell(3), WISH, tmp_path / "whole").recording
-
-    def kill(station: Station, estimate: object) -> None:
-        del estimate
-        if station.name == f"station_{after:02d}":
-            raise Killed
-
-    with pytest.raises(Killed):
-        drive(rig_cell(3), WISH, tmp_path / "killed", taken=kill)
-    assert len(read_rig(tmp_path / "killed").recording) == after
-    # A file that the next station had begun to leave is no trouble.
-    (tmp_path / "killed" / "corners" / f"station_{after + 1:02d}.left.table.csv").write_text("id,u_px")
-    end = drive(rig_cell(3), WISH, tmp_path / "killed")
-    assert end.recording == whole
-    assert read_rig(tmp_path / "killed").recording == end.recording
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_run_that_is_killed_goes_on_as_if_nothing_had_been(
+    finished: Path, tmp_path: Path, seed: int
+) -> None:
+    kills = run_killed(RIG, tmp_path / "killed", np.random.default_rng(seed), 0.6, run_rig)
+    assert kills > 0
+    assert Outcome.of(tmp_path / "killed") == Outcome.of(finished)
+    assert read_rig(tmp_path / "killed").recording == read_rig(finished).recording
 
 
-def test_drivers_that_fail_cost_attempts_but_no_station(tmp_path: Path) -> None:
-    rates = FaultRates(refused=0.2, robot_dies=0.2, off_target=0.2)
-    end = drive(rig_cell(4, faults=rates), WISH, tmp_path / "faults")
-    assert end.reason is RigEndReason.STATIONS_TAKEN
-    assert end.attempts > len(end.recording) == 7
-    never = drive(rig_cell(4, faults=FaultRates(refused=1.0)), WISH)
-    assert never.reason is RigEndReason.TOO_MANY_FAILURES
-    assert len(never.recording) == 0
+def test_what_a_break_leaves_of_the_recording_is_made_again(finished: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(finished, tmp_path / "s"))
+    lost = next((folder / "corners").glob("station_03.*"))
+    content = lost.read_bytes()
+    lost.unlink()
+    open_rig_session(folder).close()
+    assert lost.read_bytes() == content
+    (folder / "recording.toml").unlink()
+    open_rig_session(folder).close()
+    assert read_rig(folder).recording == read_rig(finished).recording
 
 
-def test_the_folder_of_another_cell_is_refused(tmp_path: Path) -> None:
-    open_or_create(tmp_path / "a", rig_cell(1).empty)
+def test_what_was_edited_is_refused(finished: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(finished, tmp_path / "s"))
+    corners = next((folder / "corners").glob("station_03.*"))
+    good, table = corners.read_text(), folder / "recording.toml"
+    number = good.split(",")[3]
+    corners.write_text(good.replace(number, str(float(number) + 5), 1))
+    with pytest.raises(InputError, match="station_03 is not as in the journal"):
+        open_rig_session(folder)
+    corners.write_text(good)
+    said = table.read_text()
+    table.write_text(said.replace('on = "flange"', 'on = "base"', 1))
+    with pytest.raises(InputError, match="not those that the session began with"):
+        open_rig_session(folder)
+    table.write_text(said)
+    lines = (folder / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    (folder / "journal.jsonl").write_bytes(b"".join(lines[:-1]))
     with pytest.raises(InputError) as caught:
-        open_or_create(tmp_path / "a", rig_cell(2).empty)
-    assert caught.value.code == "other_cell"
+        open_rig_session(folder)
+    assert caught.value.code == "journal_cut"
+    assert (folder / "corners" / corners.name).read_text() == good
+
+
+@pytest.mark.parametrize("fault", ["refused", "robot_dies", "off_target", "camera_fails", "garbage"])
+def test_each_fault_costs_attempts_but_no_station(tmp_path: Path, fault: str) -> None:
+    rates = FaultRates(**{fault: 0.25})
+    asked = replace(RIG, seed=4, most_views=6, simulation=Simulation(faults=rates))
+    end = run_rig(asked, tmp_path / "s")
+    assert end.reason is EndReason.VIEWS_TAKEN
+    assert (end.stations, len(read_rig(tmp_path / "s").recording)) == (6, 6)
+    assert end.calibration is not None
+    entries = [json.loads(line) for line in (tmp_path / "s" / "journal.jsonl").read_text().splitlines()]
+    # One camera that fails costs its own views; the others of the station are kept, and it is said.
+    noticed = [e for e in entries if e.get("failure") or e.get("detail")]
+    assert noticed
+    off = judged(rig_cell(asked), end).error_mm
+    assert max(off.values()) < 5
+
+
+def test_a_robot_that_never_goes_ends_the_run(tmp_path: Path) -> None:
+    end = run_rig(replace(RIG, simulation=Simulation(faults=FaultRates(refused=1.0))), tmp_path / "s")
+    assert end.reason is EndReason.TOO_MANY_FAILURES
+    assert (end.stations, end.calibration) == (0, None)
+
+
+class Watched:
+    """A robot that remembers where it was sent."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot, self.goals = robot, list[Goal]()
+
+    def move_to(self, goal: Goal) -> None:
+        self.goals.append(goal)
+        self.robot.move_to(goal)
+
+    def read_pose(self) -> Reading:
+        return self.robot.read_pose()
+
+    def stop(self) -> None:
+        self.robot.stop()
+
+
+def test_no_goal_leaves_the_workspace_and_what_is_mounted_takes_part(tmp_path: Path) -> None:
+    prepared = rig_cell(RIG)
+    space = prepared.cell.workspace
+    assert space is not None
+    robot = Watched(prepared.cell.robot)
+    low = prepared.start.T_base_flange.translation - 0.25
+    tight = replace(space, lower_m=low, upper_m=low + 0.5)
+    session, store = begin_rig(
+        replace(prepared, cell=replace(prepared.cell, robot=robot, workspace=tight)), tmp_path / "s"
+    )
+    end = session.run()
+    store.close()
+    assert robot.goals
+    assert all(tight.contains(goal.T_base_flange.translation) for goal in robot.goals)
+    assert end.stations == 7
+
+
+def test_cameras_that_do_not_move_against_the_arm_alone_are_no_start(tmp_path: Path) -> None:
+    """Where no station ties every camera, small turns go on; they are counted, and the run ends."""
+    blind = replace(RIG, most_views=4, simulation=Simulation(faults=FaultRates(not_found=1.0)))
+    end = run_rig(blind, tmp_path / "s")
+    assert end.reason in {EndReason.TOO_MANY_FAILURES, EndReason.NO_START}
+    store = open_rig_session(tmp_path / "s")
+    store.close()
+    failures = {entry.failure for entry in store.entries}
+    assert failures == {Failure.NOT_FOUND}

@@ -13,15 +13,14 @@ from handeye.errors import DeviceError, InputError
 from handeye.planning.collisions import Body
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Reading, Robot
-from handeye.session.attempt import Cell, Missed, Seen, Timeouts, attempt
-from handeye.session.choosing import ArmChooser
+from handeye.session.attempt import Cell, Missed, Seen, Timeouts
 from handeye.session.configuration import Prepared, begin, go_on, prepare
 from handeye.session.contract import check_at_rest
 from handeye.session.deciding import EndReason, Situation
 from handeye.session.entry import Entry, Failure
 from handeye.session.safety import objection_to_motion
 from handeye.types import Mounting, Pose
-from sessions import configured
+from sessions import attempt, configured
 
 PREPARED = prepare(configured(0))
 HOME = np.array(PREPARED.start.joints_rad) if PREPARED.start is not None else np.zeros(6)
@@ -62,7 +61,7 @@ def goal_at(arm: Arm, joints: np.ndarray, label: str = "view_01.1", **changes: f
 
 
 def tried(cell: Cell, goal: Goal) -> Seen | Missed:
-    return attempt(cell, goal, frozenset(), {})
+    return attempt(cell, goal)
 
 
 def test_goals_that_break_a_rule_are_never_sent() -> None:
@@ -151,13 +150,12 @@ def test_decisions_begin_where_the_journal_says_that_the_arm_stands(tmp_path: Pa
     for _ in range(3):
         session.take(session.next())  # type: ignore[arg-type]
     store.close()
-    chooser = prepared.chooser()
-    assert isinstance(chooser, ArmChooser)
+    assert prepared.start is not None
     entries = list(store.entries)
     stood = tuple((HOME + 0.1).tolist())
     entries.append(replace(entries[-1], number=4, view=None, moved=True, standing_rad=stood))
     situation = Situation(tuple(entries), (), None, None)  # type: ignore[arg-type]
-    assert chooser._standing(situation) == stood  # pyright: ignore[reportPrivateUsage]
+    assert situation.standing(prepared.start) == stood
 
 
 def test_a_picture_that_comes_again_is_no_new_one() -> None:
@@ -166,8 +164,7 @@ def test_a_picture_that_comes_again_is_no_new_one() -> None:
     tried(prepared.cell, goal)  # which way it came from tells in the play of the joints
     first = tried(prepared.cell, goal)
     assert isinstance(first, Seen)
-    assert first.digest is not None
-    again = attempt(prepared.cell, goal, frozenset({first.digest}), {})
+    again = attempt(prepared.cell, goal, frozenset({first.digest}))
     assert isinstance(again, Missed)
     assert again.failure is Failure.STALE_IMAGE
 

@@ -13,6 +13,8 @@ from handeye.cli.output import check_output
 from handeye.cli.source import Source
 from handeye.datasets.writing import replace_file
 from handeye.errors import OutputError
+from handeye.importing import is_rig
+from handeye.session.rig_prepared import arm_of_rig
 from handeye.types.calibration import ModelName
 
 if TYPE_CHECKING:
@@ -56,12 +58,41 @@ def report(
         raise OutputError(f"{output}: expected .html", code="unknown_format")
     from handeye.report import html_page, to_dict  # noqa: PLC0415 - other commands need no pictures
 
+    if source.only is None and result.is_dir() and is_rig(result):
+        if pictures:
+            raise UsageError("pictures are shown of one camera", hint="give --only with --pictures")
+        return _of_rig(result, output, model, source, reduced=reduced)
     gathered = _gathered(result, output, model, source, reduced=reduced, is_drawn=pictures)
     page = html_page(gathered).encode()
     replace_file(output, page)
     return Answer(
         to_dict(gathered.numbers), lambda console: _show(console, gathered.numbers, output, len(page))
     )
+
+
+def _of_rig(folder: Path, output: Path, model: ModelName | None, source: Source, *, reduced: bool) -> Answer:
+    from handeye.report import RigReport  # noqa: PLC0415
+
+    if model is ModelName.PAPER:
+        raise UsageError("the paper's model has one camera", hint="leave --model out, or give --only")
+    words = ["handeye", "report", str(folder), *_source_words(source), *(["--reduced"] if reduced else [])]
+    made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    command = shlex.join([*words, "--output", str(output)])
+    about = RigReport.of(
+        source.open_rig(folder), command=command, made=made, reduced=reduced, kinematics=arm_of_rig(folder)
+    )
+    page = about.html().encode()
+    replace_file(output, page)
+
+    def show(console: "Console") -> None:
+        from handeye.cli.wording import heading, notices  # noqa: PLC0415
+
+        recording = about.opened.recording
+        heading(console, recording.name, f"{len(recording.cameras)} cameras, {len(recording)} stations")
+        notices(console, "Warnings", about.warnings)
+        console.print(f"written: {output} ({len(page) / 1000:.0f} kB)", markup=False, soft_wrap=True)
+
+    return Answer(about.to_dict(), show)
 
 
 def _gathered(

@@ -14,7 +14,8 @@ from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_new_folder
 from handeye.cli.page import Live, Page
 from handeye.cli.run_answer import judged_by, run_answer
-from handeye.cli.run_options import Lens, Limits, Simulated, TimeoutOptions
+from handeye.cli.run_options import Lens, Limits, Rig, Simulated, TimeoutOptions
+from handeye.cli.run_rig import check_rig, resume_rig, run_rig
 from handeye.cli.work import WorkOptions, check_touch
 from handeye.datasets import read_camera, read_target
 from handeye.estimation import Estimate
@@ -35,6 +36,7 @@ from handeye.session.prepared import Prepared
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore
+from handeye.studies.rig_cell import rig_cell
 from handeye.types import Mounting
 from handeye.types.calibration import MM_PER_M, ModelName
 
@@ -58,18 +60,19 @@ def run(
     accuracy_deg: float = 0.05,
     touch_mm: float | None = None,
     max_views: int = 20,
-    anyway: bool = False,
     seed: Seed = 0,
     model: ModelName = ModelName.AUTO,
     policy: str = "next_best_view",
     refine: bool = True,
     resume: bool = False,
+    anyway: bool = False,
     dry_run: bool = False,
     confirm: Annotated[bool | None, Parameter(negative="--no-confirm", show_default=False)] = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen, like those below
     work: WorkOptions = WorkOptions(),  # noqa: B008
     timeouts: TimeoutOptions = TimeoutOptions(),  # noqa: B008
     unknown: Lens = Lens(),  # noqa: B008
+    several: Rig = Rig(),  # noqa: B008
     simulated: Simulated = Simulated(),  # noqa: B008
     page: Page = Page(),  # noqa: B008
     common: Common = Common(),  # noqa: B008
@@ -108,9 +111,6 @@ def run(
         work, and choose views for it.
     max_views
         Stop at so many views in any case.
-    anyway
-        Go on where the accuracy is out of reach. Else a run ends where, from five views on, even 40 would not
-        come near it, and says what they would come to.
     seed
         Of every choice by chance, and of the simulated cell.
     model
@@ -122,6 +122,9 @@ def run(
         Climb from the best candidates to better ones near them; without it the best that was drawn is taken.
     resume
         Go on with a session; everything else is taken from it.
+    anyway
+        Go on where the accuracy is out of reach. Else a run ends where, from five views on, even 40 would not
+        come near it, and says what they would come to.
     dry_run
         Show what would be done first; nothing moves and nothing is written.
     confirm
@@ -140,7 +143,7 @@ def run(
         )
     if replays:
         driver = f"{REPLAY}:{Path(driver.partition(':')[2]).resolve()}"
-    elif robot is None and driver == SIMULATED:
+    elif robot is None and driver == SIMULATED and not several.rig:
         robot = DEFAULT_ARM
     robot = None if robot is None else _described(robot)
     if images is None:
@@ -173,16 +176,18 @@ def run(
         simulation=simulated.simulation(),
         touch_mm=touch_mm,
         work=work.work(),
+        rig=several.settings(),
         anyway=anyway,
     )
-    if (driver == SIMULATED) != (images == SIMULATED):
-        raise UsageError("--driver and --images are either both simulated or both not")
+    _check(configuration, given=(camera, target, mounting) != (None, None, None), shown=page.ui or dry_run)
     if not dry_run:
         if session is None:
             hint = "name a folder to write, or look first with --dry-run"
             raise UsageError("--session is missing", hint=hint)
         check_new_folder(session)
     front = _Front(page if not dry_run else Page(), configuration, confirm, as_json=common.json)
+    if session is not None and configuration.rig is not None:
+        return run_rig(session, rig_cell(configuration, confirm=front.confirm, observer=front.observer))
     prepared = prepare(
         configuration,
         camera=None if camera is None else read_camera(camera),
@@ -227,12 +232,22 @@ def _driven(loop: Session, store: SessionStore, prepared: Prepared, front: _Fron
 def _resumed(session: Path, confirm: bool | None, page: Page, *, as_json: bool) -> Answer:
     configuration = Configuration.from_dict(read_settings(session).asked.get("configuration"))
     front = _Front(page, configuration, confirm, as_json=as_json)
+    if configuration.rig is not None:
+        return resume_rig(session, front.confirm, front.observer, front.person.tell)
     loop, store, prepared = go_on(
         session, person=front.person, confirm=front.confirm, observer=front.observer
     )
     if store.notice is not None:
         front.person.tell(f"warning: {store.notice}")
     return run_answer(session, configuration, prepared, _driven(loop, store, prepared, front))
+
+
+def _check(configuration: Configuration, *, given: bool, shown: bool) -> None:
+    """Refuse options that do not go together."""
+    if configuration.rig is not None:
+        check_rig(configuration, given=given, shown=shown)
+    if (configuration.driver == SIMULATED) != (configuration.images == SIMULATED):
+        raise UsageError("--driver and --images are either both simulated or both not")
 
 
 def _described(robot: str) -> str:
@@ -291,7 +306,7 @@ class _Progress(Observer):
         if estimate is not None:
             now = estimate.within_95
             known = f"  (before: within {now.translation_mm:.2f} mm, {now.rotation_deg:.3f} deg)"
-        what = "ok" if entry.view is not None else f"{entry.failure}: {entry.detail[:100]}"
+        what = "ok" if entry.brought is not None else f"{entry.failure}: {entry.detail[:100]}"
         seconds = sum(entry.timings_s.values())
         print(
             f"{entry.label:<11} {entry.phase:<6}{seconds:5.1f} s  {what}{known}", file=sys.stderr, flush=True

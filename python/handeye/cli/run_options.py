@@ -5,10 +5,11 @@ from typing import Literal
 
 from cyclopts import Parameter
 
+from handeye.cli.failures import UsageError
 from handeye.session.attempt import Timeouts
 from handeye.session.drivers import MANUAL
 from handeye.session.faults import FaultRates
-from handeye.session.settings import Collisions, Simulation
+from handeye.session.settings import Collisions, RigSettings, Simulation
 from handeye.session.simulated import usual_errors
 
 
@@ -74,6 +75,41 @@ class Lens:
     """Of which kind it is, kannala_brandt for a fisheye; by default the views tell."""
     uncalibrated: bool = False
     """Begin a simulated cell without its camera's calibration."""
+
+
+@Parameter(name="*", group="Several cameras")
+@dataclass(frozen=True)
+class Rig:
+    """A simulated rig of several cameras and two boards; the accuracy is asked for of every camera."""
+
+    rig: bool = False
+    """Drive two cameras on the flange (left, right) and two beside the arm (front, side) at once."""
+    cameras: tuple[str, ...] | None = None
+    """Those that take part; all four by default."""
+    camera_to_camera_mm: float | None = None
+    """Ask for cameras of one body in each other too: radius of their position."""
+    camera_to_camera_deg: float | None = None
+    """The same for their rotation."""
+
+    def settings(self) -> RigSettings | None:
+        """Return it as the library takes it; None for one camera.
+
+        Raises
+        ------
+        UsageError
+            Options that need others.
+        """
+        radii = (self.camera_to_camera_mm, self.camera_to_camera_deg)
+        if not self.rig:
+            if self != Rig():
+                raise UsageError("--cameras and --camera-to-camera need --rig")
+            return None
+        mm, deg = radii
+        if mm is None and deg is None:
+            return RigSettings(self.cameras)
+        if mm is None or deg is None:
+            raise UsageError("--camera-to-camera-mm and --camera-to-camera-deg go together")
+        return RigSettings(self.cameras, (mm, deg))
 
 
 @Parameter(name="*", group="Simulated cell")

@@ -13,6 +13,9 @@ from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_output, write_json
 from handeye.cli.progress import progress
 from handeye.cli.source import Source, mindful_of
+from handeye.cli.validate_rig import answer_for_rig
+from handeye.importing import is_rig
+from handeye.session.rig_prepared import arm_of_rig
 from handeye.types.calibration import ModelName
 from handeye.validation.splits import ModelCheck, Validation
 from handeye.validation.splits import validate as validate_recording
@@ -58,6 +61,8 @@ def validate(
     if splits < 1 or seed < 0:
         raise UsageError("--splits is at least 1 and --seed not below 0")
     check_output(output)
+    if source.only is None and is_rig(folder):
+        return answer_for_rig(source.open_rig(folder), model, splits, seed, output, arm_of_rig(folder))
     opened = source.open(folder)
     workers = max(1, min(os.cpu_count() or 1, splits // SPLITS_PER_WORKER))
     with progress("Splitting the views") as advance, mindful_of(opened.warnings):

@@ -15,16 +15,16 @@ Units and frames are those of version 1, which is what is written where there is
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from handeye.datasets.corners import corners_text, read_corners
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning, recording_warnings
-from handeye.datasets.reading import existing_folder, inside, located
+from handeye.datasets.reading import existing_folder, inside, located, read_text
 from handeye.datasets.recording_format import Rows
-from handeye.datasets.recording_header import FILE_NAME, FORMAT, RIG_VERSION, read_versioned
+from handeye.datasets.recording_header import FILE_NAME, FORMAT, MAX_BYTES, RIG_VERSION, read_versioned
 from handeye.datasets.recording_writing import keep_image, write_recording
 from handeye.datasets.toml_text import toml_text
 from handeye.datasets.writing import new_folder, replace_file, write_file
@@ -108,21 +108,11 @@ def read_rig(folder: str | os.PathLike[str]) -> LoadedRig:
                 code="truncated",
                 hint="the file may have been cut off; if it was edited on purpose, correct station_count",
             )
-        cameras = {
-            name: MountedCamera(Camera.from_dict(rest), body)
-            for name, body, rest in _named(document.camera, "camera")
-        }
-        targets = {
-            name: MountedTarget(Target.from_dict(rest), body)
-            for name, body, rest in _named(document.target, "target")
-        }
-        recording = RigRecording(
-            document.name,
-            cameras,
-            targets,
-            _stations(document, cameras, root),
-            _truth(document.truth, cameras, targets),
-            document.source,
+        empty = _header(document)
+        recording = replace(
+            empty,
+            stations=_stations(document, empty.cameras, root),
+            truth=_truth(document.truth, empty.cameras, empty.targets),
         )
     return LoadedRig(recording, root, rig_warnings(recording))
 
@@ -165,25 +155,84 @@ def write_rig(
         write_file(partial / FILE_NAME, _text(recording, views))
 
 
-def append_station(recording: RigRecording, folder: Path) -> None:
-    """Add the last station to a recording that holds all before it; a reader finds it whole or not at all.
+def update_rig(recording: RigRecording, folder: Path) -> None:
+    """Write a recording over the one in a folder; a reader finds the new one or the old.
+
+    It is version 2 also with one camera and one target. Images stay as they are, and views keep only those
+    that lie there.
 
     Raises
     ------
     OutputError
         The system refuses to write.
     """
-    *before, last = recording.stations
-    tables = [_table(station, one, None) for station in before for one in station.views]
     try:
         (folder / "corners").mkdir(exist_ok=True)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error})") from error
-    for one in last.views:
-        # Where a run was killed between the two, the file is there already.
-        replace_file(folder / _corners(last, one), corners_text(one.view).encode())
-        tables.append(_table(last, one, None))
+    tables: list[dict[str, Any]] = []
+    for station in recording.stations:
+        for one in station.views:
+            path = folder / _corners(station, one)
+            text = corners_text(one.view)
+            # One of the same name holds the same view, or what a write left that was broken off.
+            if not _holds(path, text):
+                replace_file(path, text.encode())
+            tables.append(_table(station, one, keep_image(one.view, folder, None, "")))
     replace_file(folder / FILE_NAME, _text(recording, tables))
+
+
+def _holds(path: Path, text: str) -> bool:
+    try:
+        return read_text(path, MAX_BYTES) == text
+    except InputError:
+        return False
+
+
+@dataclass(frozen=True)
+class StationsApart:
+    """A recording without its stations, and each station by its name, or what is wrong with it."""
+
+    recording: RigRecording
+    stations: dict[str, Station | InputError]
+
+
+def read_stations_apart(folder: Path) -> StationsApart:
+    """Read a recording of which single stations may be damaged; its truth is left out.
+
+    Raises
+    ------
+    InputError
+        The recording cannot be read at all.
+    """
+    file = folder / FILE_NAME
+    document = read_document(read_versioned(file), _RigDocument, str(file))
+    found: dict[str, Station | InputError] = {}
+    with located(str(file)):
+        recording = _header(document)
+        for station in document.station:
+            seen = [one for one in document.view if one.station == station.name]
+            try:
+                found[station.name] = _station(station, seen, recording.cameras, folder)
+            except InputError as error:
+                found[station.name] = error
+    return StationsApart(recording, found)
+
+
+def header_of(recording: RigRecording) -> dict[str, Any]:
+    """Return plain values of a recording without stations and truth; `recording_of` reads them back."""
+    return _document(recording.with_stations(()), [], with_truth=False)
+
+
+def recording_of(header: object) -> RigRecording:
+    """Read what `header_of` wrote.
+
+    Raises
+    ------
+    InputError
+        A missing, unknown or unusable field.
+    """
+    return _header(read_document(header, _RigDocument, "recording"))
 
 
 def _corners(station: Station, one: CameraView) -> str:
@@ -221,27 +270,44 @@ def _named(tables: list[dict[str, Any]], what: str) -> list[tuple[str, Body, dic
     return found
 
 
+def _header(document: _RigDocument) -> RigRecording:
+    """Return the recording without its stations."""
+    cameras = {
+        name: MountedCamera(Camera.from_dict(rest), body)
+        for name, body, rest in _named(document.camera, "camera")
+    }
+    targets = {
+        name: MountedTarget(Target.from_dict(rest), body)
+        for name, body, rest in _named(document.target, "target")
+    }
+    return RigRecording(document.name, cameras, targets, (), None, document.source)
+
+
 def _stations(
     document: _RigDocument, cameras: Mapping[str, MountedCamera], root: Path
 ) -> tuple[Station, ...]:
-    places = {station.name: number for number, station in enumerate(document.station)}
-    views: dict[str, list[CameraView]] = {name: [] for name in places}
-    poses: dict[str, Pose] = {}
-    for station in document.station:
-        with located(f"station {station.name[:60]}: T_base_flange"):
-            poses[station.name] = Pose(station.T_base_flange)
+    views: dict[str, list[_ViewDocument]] = {station.name: [] for station in document.station}
     for one in document.view:
-        if one.station not in places or one.camera not in cameras:
-            raise InputError(
-                f"view of {one.station[:60]!r} by {one.camera[:60]!r}: no such station or camera",
-                code="invalid_field",
-            )
-        where = f"station {one.station}, camera {one.camera}"
-        station = document.station[places[one.station]]
+        if one.station not in views:
+            raise InputError(f"view of {one.station[:60]!r}: no such station or camera", code="invalid_field")
+        views[one.station].append(one)
+    return tuple(_station(station, views[station.name], cameras, root) for station in document.station)
+
+
+def _station(
+    station: _StationDocument, seen: list[_ViewDocument], cameras: Mapping[str, MountedCamera], root: Path
+) -> Station:
+    with located(f"station {station.name[:60]}: T_base_flange"):
+        pose = Pose(station.T_base_flange)
+    views: list[CameraView] = []
+    for one in seen:
+        where = f"station {station.name[:60]}, camera {one.camera[:60]}"
+        if one.camera not in cameras:
+            raise InputError(f"{where}: no such station or camera", code="invalid_field")
         ids, pixels, sigmas = read_corners(inside(root, one.corners, f"{where}: corners"))
         view = View(
-            one.station,
-            poses[one.station],
+            station.name,
+            pose,
             ids,
             pixels,
             one.image,
@@ -259,13 +325,14 @@ def _stations(
                     code="image_size",
                     hint="the camera must be calibrated at the size of the images",
                 )
-        views[one.station].append(CameraView(one.camera, one.target, view))
-    for name, seen in views.items():
-        if not seen:
-            raise InputError(
-                f"station {name[:60]}: no camera saw a target", code="no_points", hint="leave the station out"
-            )
-    return tuple(Station(tuple(seen)) for seen in views.values())
+        views.append(CameraView(one.camera, one.target, view))
+    if not views:
+        raise InputError(
+            f"station {station.name[:60]}: no camera saw a target",
+            code="no_points",
+            hint="leave the station out",
+        )
+    return Station(tuple(views))
 
 
 def _truth(
@@ -294,8 +361,12 @@ def _truth(
 
 
 def _text(recording: RigRecording, views: list[dict[str, Any]]) -> bytes:
+    return toml_text(_document(recording, views, with_truth=True)).encode()
+
+
+def _document(recording: RigRecording, views: list[dict[str, Any]], *, with_truth: bool) -> dict[str, Any]:
     truth: list[dict[str, Any]] = []
-    if recording.truth is not None:
+    if recording.truth is not None and with_truth:
         truth += [
             {"name": name, recording.cameras[name].mounting.x_name: pose.to_list()}
             for name, pose in recording.truth.cameras.items()
@@ -304,7 +375,7 @@ def _text(recording: RigRecording, views: list[dict[str, Any]]) -> bytes:
             {"name": name, recording.targets[name].pose_name: pose.to_list()}
             for name, pose in recording.truth.targets.items()
         ]
-    document = without_none(
+    return without_none(
         format=FORMAT,
         version=RIG_VERSION,
         name=recording.name,
@@ -330,4 +401,3 @@ def _text(recording: RigRecording, views: list[dict[str, Any]]) -> bytes:
         ],
         view=views,
     )
-    return toml_text(document).encode()

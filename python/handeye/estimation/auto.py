@@ -152,9 +152,7 @@ def _information(information: FloatArray, kept: list[int], fit: CellFit) -> Floa
     """Return the information of some parameters; of several cameras, with what the others leave of it."""
     if len(fit.measurements.cameras) == 1 and len(fit.measurements.targets) == 1:
         return information[np.ix_(kept, kept)]
-    scale = 1 / np.sqrt(np.diag(information))
-    inverse = np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)
-    block = inverse[np.ix_(kept, kept)]
+    block = fit.inverse_information[np.ix_(kept, kept)]
     scale = 1 / np.sqrt(np.diag(block))
     found = np.linalg.inv(block * np.outer(scale, scale)) * np.outer(scale, scale)
     return 0.5 * (found + found.T)

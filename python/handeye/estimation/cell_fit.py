@@ -105,6 +105,13 @@ class CellFit:
             found[name] = Camera(prior.camera.lens, parameters, *prior.camera.size_px)
         return found
 
+    @cached_property
+    def inverse_information(self) -> FloatArray:
+        """(n, n) inverse of the information."""
+        information = np.asarray(self.posterior.information)
+        scale = 1 / np.sqrt(np.diag(information))
+        return np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)
+
     def rows_of_x(self, camera: str) -> list[int]:
         """Return where the twist of a camera's X stands among the parameters."""
         first = 6 * list(self.measurements.cameras).index(camera)

@@ -35,13 +35,19 @@ class RigMeasurements:
     views: Mapping[str, View]
 
     @classmethod
-    def of(cls, recording: RigRecording) -> "RigMeasurements":
-        """Measure the pose of the target in every view."""
-        pairs = {pair: Measurements.of_recording(recording.pair(*pair)) for pair in recording.pairs}
-        for pair, measured in pairs.items():
+    def of(cls, recording: RigRecording, known: "RigMeasurements | None" = None) -> "RigMeasurements":
+        """Measure the pose of the target in every view; those of `known` are not measured again."""
+        pairs: dict[Pair, Measurements] = {}
+        for pair in recording.pairs:
+            one = recording.pair(*pair)
+            before = None if known is None else known.pairs.get(pair)
+            names = set[str]() if before is None else {v.name for v in before.views} | set(before.rejected)
+            if before is None or not names <= {view.name for view in one.views}:  # one was taken back
+                before, names = Measurements.of(one.mounting, one.camera, one.target), set[str]()
+            new = [view for view in one.views if view.name not in names]
             if not recording.moves(*pair):
-                still = tuple(replace_pose(view, Pose.identity()) for view in measured.views)
-                pairs[pair] = replace(measured, views=still)
+                new = [replace_pose(view, Pose.identity()) for view in new]
+            pairs[pair] = before.with_views(new)
         views = {station.name: station.views[0].view for station in recording.stations}
         return cls(recording.cameras, recording.targets, pairs, views)
 

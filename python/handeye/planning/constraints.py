@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate
@@ -12,7 +13,7 @@ from handeye.estimation.lens_confidence import lens_deviation_px
 from handeye.planning.collisions import Body, first_reasons
 from handeye.planning.prediction import Prediction, Sight
 from handeye.robots import Arm
-from handeye.types import Mounting
+from handeye.types import Mounting, Pose, Target
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.pose import inverses
 
@@ -132,15 +133,10 @@ class ViewConstraints:
         return poses if self.estimate.mounting is Mounting.EYE_TO_HAND else inverses(poses)
 
     def _bad_views(self, motions: FloatArray) -> list[str | None]:
-        estimate = self.estimate
-        poses = estimate.X.matrix @ motions @ estimate.Y.matrix
-        middle = poses[:, :3, :3] @ estimate.target.points.mean(axis=0) + poses[:, :3, 3]
-        distance = np.linalg.norm(middle, axis=1)
-        cosine = np.einsum("ki,ki->k", poses[:, :3, 2], middle) / np.maximum(distance, 1e-9)
-        near, far = self.limits.distance_m
+        far, oblique = out_of_limits(self.estimate, motions, self.limits)
         return first_reasons(
-            (~((near <= distance) & (distance <= far)), "too near to the target or too far from it"),
-            (cosine < np.cos(self.limits.tilt_rad), "the target would be seen too obliquely"),
+            (far, "too near to the target or too far from it"),
+            (oblique, "the target would be seen too obliquely"),
         )
 
     def _hidden(self, motions: FloatArray) -> list[str | None]:
@@ -154,6 +150,18 @@ class ViewConstraints:
         return first_reasons(((to_failed < radius).any(axis=1), NEAR_FAILURE))
 
 
+def out_of_limits(
+    estimate: Estimate, motions: FloatArray, limits: ViewLimits
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell for motions (N, 4, 4) where a target is too near or too far (N,), and where seen obliquely."""
+    poses = estimate.X.matrix @ motions @ estimate.Y.matrix
+    middle = poses[:, :3, :3] @ estimate.target.points.mean(axis=0) + poses[:, :3, 3]
+    distance = np.linalg.norm(middle, axis=1)
+    cosine = np.einsum("ki,ki->k", poses[:, :3, 2], middle) / np.maximum(distance, 1e-9)
+    near, far = limits.distance_m
+    return ~((near <= distance) & (distance <= far)), cosine < np.cos(limits.tilt_rad)
+
+
 def sight_of(estimate: Estimate, limits: ViewLimits) -> Sight:
     """Return what a view must show: the margin grows with what the estimate does not know."""
     return Sight(limits.margin_px + _doubt_px(estimate, limits), limits.fewest)
@@ -163,10 +171,14 @@ def mounted_points(estimate: Estimate) -> FloatArray:
     """(P, 3) points in the flange of what is mounted there: the camera's centre, or the target's corners."""
     if estimate.mounting is Mounting.EYE_IN_HAND:
         return estimate.X.inverse().matrix[np.newaxis, :3, 3]
-    points = estimate.target.points
-    low, high = points.min(axis=0), points.max(axis=0)
+    return corners_at(estimate.target, estimate.Y)
+
+
+def corners_at(target: Target, Y: Pose) -> FloatArray:
+    """(4, 3) the corners of the box around a target, whose pose is Y."""
+    low, high = target.points.min(axis=0), target.points.max(axis=0)
     corners = np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
-    return estimate.Y.act(corners)
+    return Y.act(corners)
 
 
 def _doubt_px(estimate: Estimate, limits: ViewLimits) -> float:

@@ -16,10 +16,12 @@ from handeye.errors import InputError
 from handeye.estimation import Estimate, RigEstimate
 from handeye.estimation.confidence import Within
 from handeye.planning.candidates import Pool
+from handeye.planning.constraints import ViewLimits, corners_at, out_of_limits
 from handeye.planning.prediction import Prediction, Sight
 from handeye.planning.visibility import obstacles
 from handeye.types.arrays import FloatArray
 from handeye.types.mounting import Mounting
+from handeye.types.rig import Body
 
 Pair = tuple[str, str]
 # Candidates whose joint information is computed.
@@ -79,6 +81,22 @@ def _factor(now: Within, translation_mm: float, rotation_deg: float) -> float:
     return max(now.translation_mm / translation_mm, now.rotation_deg / rotation_deg)
 
 
+def mounted_on_flange(estimate: RigEstimate) -> FloatArray:
+    """(P, 3) points in the flange of what is mounted there: centres of cameras, corners of targets."""
+    fit = estimate.fit
+    parts = [
+        fit.X[name].inverse().matrix[np.newaxis, :3, 3]
+        for name, one in fit.measurements.cameras.items()
+        if one.body is Body.FLANGE
+    ]
+    parts += [
+        corners_at(one.target, fit.Y[name])
+        for name, one in fit.measurements.targets.items()
+        if one.body is Body.FLANGE
+    ]
+    return np.concatenate([np.zeros((0, 3)), *parts])
+
+
 @dataclass(frozen=True, eq=False)
 class RigGains:
     """Gains of candidates.
@@ -106,6 +124,7 @@ def rig_gains(
     pool: Pool,
     wanted: Mapping[tuple[str, ...], float],
     sight: Sight | None = None,
+    limits: ViewLimits | None = None,
 ) -> RigGains:
     """Gain of every candidate for what is wanted: `RigRequest.missing`, or all cameras where that is empty.
 
@@ -119,6 +138,8 @@ def rig_gains(
         Cameras, or two in each other, by their names.
     sight
         What a camera must see of a target.
+    limits
+        From how far and how obliquely; None for any.
 
     Raises
     ------
@@ -144,6 +165,8 @@ def rig_gains(
     for pair, one in pairs.items():
         # What the arm adds is weighed for those on the short list only.
         gains = Prediction(_without_arm(one), sight).gains(criterion, motions[one.mounting])
+        if limits is not None:
+            gains[np.logical_or(*out_of_limits(one, motions[one.mounting], limits))] = np.nan
         visible[pair] = np.isfinite(gains)
         # A camera that is good enough still helps others a little, through the arm and the board.
         sums += np.nan_to_num(gains) * (1.0 if pair[0] in needed else 0.1)

@@ -46,6 +46,11 @@ def html_page(gathered: Gathered) -> str:
 
     All text is escaped but the style and the pictures, which are ours and escape their words themselves.
     """
+    return rendered("report.html", _context(gathered))
+
+
+def rendered(template: str, context: dict[str, Any]) -> str:
+    """Return a page of ours; the style is put in, and all else is escaped."""
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -53,7 +58,8 @@ def html_page(gathered: Gathered) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template("report.html").render(_context(gathered))
+    style = (_TEMPLATES / "style.css").read_text(encoding="utf-8")
+    return environment.get_template(template).render(context | {"style": style})
 
 
 def _context(gathered: Gathered) -> dict[str, Any]:
@@ -67,7 +73,6 @@ def _context(gathered: Gathered) -> dict[str, Any]:
         "fig": figures,
         "fixed": fixed,
         "cell_of": _cell,
-        "style": (_TEMPLATES / "style.css").read_text(encoding="utf-8"),
         "title": f"Hand-eye calibration: {r.recording}" if r.recording else "Hand-eye calibration",
         "subtitle": _subtitle(r),
         "verdict": _verdict(r),

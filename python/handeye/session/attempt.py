@@ -1,4 +1,4 @@
-"""One attempt at one view: go there, see where the arm is, take the picture, find the target, judge it."""
+"""One attempt at a view or station: go there, see where the arm is, take the pictures, find the targets."""
 
 import hashlib
 import math
@@ -11,7 +11,6 @@ import numpy as np
 from handeye.cameras.protocol import BAD_FRAME, Frame, Grey, ImageSource, checked_frame
 from handeye.detection import Detection, NotFound, Prediction, Reason, detect
 from handeye.errors import DeviceError, HandeyeError, InputError
-from handeye.estimation import Estimate
 from handeye.estimation.measurements import MIN_POINTS
 from handeye.planning.collisions import Workspace
 from handeye.planning.solids import SolidLinks
@@ -22,8 +21,9 @@ from handeye.robots.replay import is_near
 from handeye.session.calls import Calls
 from handeye.session.entry import Failure
 from handeye.session.observer import Observer
-from handeye.session.safety import body_of, objection_to_motion
+from handeye.session.safety import Believed, body_of, objection_to_motion
 from handeye.types import Camera, Pose, Target
+from handeye.types.rig import CAMERA, TARGET
 
 # Reasons that the picture itself gives: light and focus, not the place.
 _POOR = frozenset(
@@ -56,15 +56,21 @@ class Timeouts:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """What an attempt brought: the pose read back, the points, whether their labels are sure, the image."""
+class Arrived:
+    """Where a motion ended, as the robot says, and what is to be noted of it."""
 
     reading: Reading
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a camera saw: the points, whether their labels are sure, the image."""
+
     detection: Detection
     image: Grey | None
-    digest: str | None
+    digest: str
     timestamp_s: float | None
-    note: str
     labels_known: bool = False
 
 
@@ -80,6 +86,20 @@ class Missed:
 
 
 @dataclass(frozen=True, eq=False)
+class Eye:
+    """One camera and one target that it may see: their names, the driver, as calibrated and as printed.
+
+    `moves` says whether the arm moves the two against each other.
+    """
+
+    name: tuple[str, str]
+    source: ImageSource
+    camera: Camera
+    target: Target
+    moves: bool = True
+
+
+@dataclass(frozen=True, eq=False)
 class Cell:
     """Everything outside: the arm and what is known of it, the camera, the target.
 
@@ -92,7 +112,7 @@ class Cell:
     workspace
         What no motion may leave; None where nothing really moves.
     camera, target
-        As calibrated and as printed.
+        As calibrated and as printed; where there are several, of the leading eye.
     confirm
         Asked before every motion; False to leave it.
     solids
@@ -103,6 +123,8 @@ class Cell:
         Whether a person moves the arm, who sees the way and may not know the joints.
     observer
         Told of what happens.
+    several
+        All cameras and the targets that they may see, where there is more than one of either.
     """
 
     robot: Robot
@@ -117,8 +139,14 @@ class Cell:
     speed_rad_s: float = math.inf
     by_hand: bool = False
     observer: Observer = field(default_factory=Observer)
+    several: tuple[Eye, ...] = ()
     robot_calls: Calls = field(default_factory=lambda: Calls("robot"))
     camera_calls: Calls = field(default_factory=lambda: Calls("camera"))
+
+    @property
+    def eyes(self) -> tuple[Eye, ...]:
+        """Every camera with every target that it may see."""
+        return self.several or (Eye((CAMERA, TARGET), self.source, self.camera, self.target),)
 
     def stop(self) -> str | None:
         """Stop the arm, also while a call runs; say why that is not confirmed, None if it is."""
@@ -144,25 +172,18 @@ class Cell:
         self.observer.stands(reading)
         return reading
 
-    def objection(self, goal: Goal, standing: Reading, estimate: Estimate | None) -> str | None:
+    def objection(self, goal: Goal, standing: Reading, believed: Believed | None) -> str | None:
         """Say why a goal must not be sent from where the arm stands, None if it may be."""
         if self.workspace is None:
             return None  # nothing moves
         if self.arm is None:
             return "the arm is not known, and no way can be checked"
-        body = body_of(self.arm, self.workspace, self.solids, estimate)
+        body = body_of(self.arm, self.workspace, self.solids, believed)
         return objection_to_motion(body, goal, standing.joints_rad, self.speed_rad_s)
 
 
-def attempt(
-    cell: Cell,
-    goal: Goal,
-    digests: frozenset[str],
-    timings: dict[str, float],
-    foresee: Callable[[Pose], Prediction | None] | None = None,
-    estimate: Estimate | None = None,
-) -> Seen | Missed:
-    """Try to take one view.
+def arrive(cell: Cell, goal: Goal, believed: Believed | None, timings: dict[str, float]) -> Arrived | Missed:
+    """Try to bring the arm to a goal.
 
     Parameters
     ----------
@@ -170,52 +191,69 @@ def attempt(
         Where.
     goal
         Where to go; checked here from where the arm really stands, however it was chosen.
-    digests
-        Of the images so far: a picture that comes again is no new picture.
-    timings
-        Filled with the seconds that each part took.
-    foresee
-        Tells from the pose read back where in the image the target should be.
-    estimate
+    believed
         What is believed: what is mounted on the arm takes part in the check.
+    timings
+        Filled with the seconds that it took.
     """
     started = time.monotonic()
-    reading = _go(cell, goal, estimate)
+    reading = _go(cell, goal, believed)
     if isinstance(reading, Missed):
         return reading
     timings["move"] = time.monotonic() - started
-    note = ""
-    if not is_near(
-        goal.T_base_flange, reading.T_base_flange, cell.timeouts.reached_m, cell.timeouts.reached_rad
-    ):
-        note = f"ended {_off(goal, reading)} from the goal; the pose read back is used"
-        why = _not_there(cell, reading, estimate)
-        if why is not None:
-            cell.stop()
-            return Missed(Failure.ELSEWHERE, f"{note.split(';')[0]}: {why}", moved=True, standing=reading)
+    if is_near(goal.T_base_flange, reading.T_base_flange, cell.timeouts.reached_m, cell.timeouts.reached_rad):
+        return Arrived(reading)
+    off = f"ended {_off(goal, reading)} from the goal"
+    why = _not_there(cell, reading, believed)
+    if why is not None:
+        cell.stop()
+        return Missed(Failure.ELSEWHERE, f"{off}: {why}", moved=True, standing=reading)
+    return Arrived(reading, f"{off}; the pose read back is used")
+
+
+def look(
+    cell: Cell,
+    eye: Eye,
+    label: str,
+    digests: frozenset[str],
+    timings: dict[str, float],
+    predicted: Prediction | None,
+) -> Seen | Missed:
+    """Try to see a target through a camera, the arm being at rest.
+
+    Parameters
+    ----------
+    cell, eye
+        Where, and which camera and target.
+    label
+        Of the attempt.
+    digests
+        Of the images so far: a picture that comes again is no new picture.
+    timings
+        The seconds that each part took are added to it.
+    predicted
+        Where in the image the target should be.
+    """
     started = time.monotonic()
     try:
-        frame = checked_frame(cell.camera_calls.run(cell.timeouts.grab_s, cell.source.grab, goal.label))
+        frame = checked_frame(cell.camera_calls.run(cell.timeouts.grab_s, eye.source.grab, label))
     except DeviceError as error:
         known = {"timeout": Failure.CAMERA_TIMEOUT, "busy": Failure.CAMERA_TIMEOUT}
         known |= {BAD_FRAME: Failure.BAD_IMAGE}
-        return Missed(
-            known.get(error.code, Failure.CAMERA_FAILED), error.message, moved=True, standing=reading
-        )
-    timings["grab"] = time.monotonic() - started
+        return Missed(known.get(error.code, Failure.CAMERA_FAILED), error.message, moved=True)
+    timings["grab"] = timings.get("grab", 0.0) + time.monotonic() - started
     started = time.monotonic()
-    predicted = None if foresee is None else foresee(reading.T_base_flange)
-    found = _look(cell, frame, digests, predicted)
-    cell.observer.looked(goal.label, frame.image, None if isinstance(found, Missed) else found[0])
-    timings["detect"] = time.monotonic() - started
+    found = _look(eye, frame, digests, predicted)
+    cell.observer.looked(label, frame.image, None if isinstance(found, Missed) else found[0])
+    timings["detect"] = timings.get("detect", 0.0) + time.monotonic() - started
     if isinstance(found, Missed):
-        return replace(found, standing=reading)
+        return found
     detection, digest = found
     sure = frame.points is not None and frame.points.labels_known
-    return Seen(reading, detection, frame.image, digest, frame.timestamp_s, note, sure)
+    return Seen(detection, frame.image, digest, frame.timestamp_s, sure)
 
 
-def _go(cell: Cell, goal: Goal, estimate: Estimate | None) -> Reading | Missed:
+def _go(cell: Cell, goal: Goal, believed: Believed | None) -> Reading | Missed:
     """See where the arm stands, check the way, go, and see where it stands then."""
     try:
         # A camera that still hangs would not see what comes; a robot that does must not be told anything new.
@@ -226,7 +264,7 @@ def _go(cell: Cell, goal: Goal, estimate: Estimate | None) -> Reading | Missed:
         before = cell.read()
     except DeviceError as error:
         return Missed(_robot_failure(error), error.message, moved=False)
-    why = cell.objection(goal, before, estimate)
+    why = cell.objection(goal, before, believed)
     if why is not None:
         return Missed(Failure.MOTION_REFUSED, why, moved=False, standing=before)
     if cell.confirm is not None and not cell.confirm(goal):
@@ -275,7 +313,7 @@ def _robot_failure(error: DeviceError) -> Failure:
     return Failure.BAD_READING if error.code in {BAD_READING, "no_joints"} else Failure.ROBOT_FAILED
 
 
-def _not_there(cell: Cell, reading: Reading, estimate: Estimate | None) -> str | None:
+def _not_there(cell: Cell, reading: Reading, believed: Believed | None) -> str | None:
     """Say what is wrong with where a motion ended, None for nothing."""
     if cell.workspace is None or cell.arm is None:
         return None
@@ -283,7 +321,7 @@ def _not_there(cell: Cell, reading: Reading, estimate: Estimate | None) -> str |
         return "outside the workspace"
     if reading.joints_rad is None:
         return None
-    body = body_of(cell.arm, cell.workspace, cell.solids, estimate)
+    body = body_of(cell.arm, cell.workspace, cell.solids, believed)
     return body.obstacles(np.array(reading.joints_rad)[np.newaxis])[0]
 
 
@@ -294,8 +332,8 @@ def _off(goal: Goal, reading: Reading) -> str:
 
 
 def _look(
-    cell: Cell, frame: Frame, digests: frozenset[str], predicted: Prediction | None
-) -> tuple[Detection, str | None] | Missed:
+    eye: Eye, frame: Frame, digests: frozenset[str], predicted: Prediction | None
+) -> tuple[Detection, str] | Missed:
     """Find the target in a frame, and tell frames that are no pictures of now."""
     if frame.points is not None:
         if len(frame.points.point_ids) < MIN_POINTS:
@@ -308,7 +346,7 @@ def _look(
         except HandeyeError as error:
             return Missed(Failure.BAD_IMAGE, error.message, moved=True)
     image = frame.image
-    width, height = cell.camera.size_px
+    width, height = eye.camera.size_px
     if image is None or image.shape != (height, width):
         shape = "none" if image is None else f"{image.shape[1]} x {image.shape[0]}"
         return Missed(
@@ -317,7 +355,7 @@ def _look(
     digest = _digest(image.tobytes())
     if digest in digests:
         return Missed(Failure.STALE_IMAGE, "the same picture as before, bit for bit", moved=True)
-    found = detect(image, cell.target, predicted=predicted)
+    found = detect(image, eye.target, predicted=predicted)
     if isinstance(found, NotFound):
         failure = Failure.POOR_IMAGE if found.reason in _POOR else Failure.NOT_FOUND
         return Missed(failure, f"{found.evidence} ({found.reason})", moved=True, digest=digest)

@@ -28,7 +28,7 @@ from handeye.session.deciding import (
     halt_of,
 )
 from handeye.session.entry import TRANSIENT, Entry, Failure
-from handeye.session.starting import Start, starting_goal
+from handeye.session.starting import Start, largest_tilt_rad, starting_goal
 from handeye.session.wish import Wish
 from handeye.types import Camera, Pose
 
@@ -76,15 +76,13 @@ class ArmChooser:
     def choose(self, situation: Situation) -> Step | Halt:
         """Return the next step, or why there is none."""
         missed, estimate = situation.counted, situation.estimate
-        if len(missed) >= self._wish.failures_in_a_row:
-            last = missed[-1]
-            return Halt(
-                EndReason.TOO_MANY_FAILURES,
-                f"{len(missed)} attempts in a row brought no view; the last: {last.failure}: {last.detail}",
-            )
-        again = self._same_place(situation)
-        if again is not None:
-            return again
+        halt = situation.too_many(self._wish.failures_in_a_row)
+        if halt is not None:
+            return halt
+        last = situation.to_repeat(self._wish.tries_at_a_place)
+        if last is not None:
+            goal = self._goal(situation, last.goal, last.goal_joints)
+            return Step(goal, "retry", {"after": last.number}, estimate)
         if estimate is None:
             return self._starting(situation)
         if missed and missed[-1].failure is Failure.NOT_FOUND and missed[-1].phase == "plan":
@@ -92,18 +90,6 @@ class ArmChooser:
             if nudge is not None:
                 return nudge
         return self._planned(situation, estimate)
-
-    def _same_place(self, situation: Situation) -> Step | None:
-        """Return another try at the last goal, if it failed for no reason of its own."""
-        missed = situation.counted
-        if not missed or missed[-1].failure not in TRANSIENT:
-            return None
-        last = missed[-1]
-        tries = sum(1 for entry in missed if entry.goal_joints == last.goal_joints)
-        if tries >= self._wish.tries_at_a_place:
-            return None
-        goal = self._goal(situation, last.goal, last.goal_joints)
-        return Step(goal, "retry", {"after": last.number}, situation.estimate)
 
     def _starting(self, situation: Situation) -> Step | Halt:
         views, missed, estimate = situation.views, situation.counted, situation.estimate
@@ -117,7 +103,9 @@ class ArmChooser:
                 )
         places = len({entry.goal_joints for entry in missed})
         body = self._body if estimate is None else self._generator.body(estimate)
-        found = starting_goal(self._start, views, places, self._camera, body, self._standing(situation))
+        tilt_rad = largest_tilt_rad(views[0], self._camera) if views else 0.0
+        standing = situation.standing(self._start)
+        found = starting_goal(self._start, len(views), places, tilt_rad, body, standing)
         if found is None:
             return Halt(
                 EndReason.NO_START if estimate is None else EndReason.NO_CANDIDATE,
@@ -134,7 +122,7 @@ class ArmChooser:
         lost = np.array(last.goal_joints)
         nearest = postures[int(np.argmin(np.abs(postures - lost).max(axis=1)))]
         joints = 0.5 * (lost + nearest)
-        standing = self._standing(situation)
+        standing = situation.standing(self._start)
         if (
             standing is not None
             and self._generator.body(estimate).obstacle_on_path(standing, joints) is not None
@@ -144,7 +132,7 @@ class ArmChooser:
         return Step(goal, "nudge", {"after": last.number}, estimate)
 
     def _planned(self, situation: Situation, estimate: Estimate) -> Step | Halt:
-        standing = self._standing(situation)
+        standing = situation.standing(self._start)
         random = np.random.default_rng([self._wish.seed, 4, len(situation.entries)])
         postures = [situation.joints(view) for view in reversed(situation.views)]
         shunned = [
@@ -203,23 +191,10 @@ class ArmChooser:
         return halt_of(answer)
 
     def _goal(self, situation: Situation, pose: Pose, joints: tuple[float, ...]) -> Goal:
-        label = f"view_{situation.next_number:02d}.{1 + len(situation.missed)}"
-        return Goal(label, pose, joints, self._speed_rad_s)
+        return Goal(situation.label("view"), pose, joints, self._speed_rad_s)
 
     @property
     def _speed_rad_s(self) -> float:
         """What was asked for, or what the slowest turning joint can do, if that is less."""
         turning = self._arm.velocities[~np.array(self._arm.sliding)]
         return min([self._wish.speed_rad_s, *turning.tolist()])
-
-    def _standing(self, situation: Situation) -> tuple[float, ...] | None:
-        """Return the joints where the arm stands, as far as the journal knows; None if nobody tells."""
-        if not self._start.posture_known:
-            return None
-        for entry in reversed(situation.entries):
-            told = None if entry.view is None else situation.joints(entry.view)
-            for joints in (entry.standing_rad, told, entry.goal_joints if entry.moved else None):
-                # Older sessions may hold readings that are not of this arm.
-                if joints is not None and len(joints) == len(self._arm):
-                    return joints
-        return self._start.joints_rad

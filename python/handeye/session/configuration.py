@@ -25,7 +25,14 @@ from handeye.session.observer import Observer
 from handeye.session.prepared import Prepared
 from handeye.session.safety import body_of
 from handeye.session.self_calibration import SelfCalibration, nominal_camera
-from handeye.session.settings import Collisions, Configuration, check_fingerprints, fingerprints, read_start
+from handeye.session.settings import (
+    Collisions,
+    Configuration,
+    check_fingerprints,
+    fingerprints,
+    read_start,
+    settings_of,
+)
 from handeye.session.simulated import SimulationOptions, simulated_cell
 from handeye.session.starting import Start
 from handeye.session.store import SessionStore, create_session, open_session
@@ -121,13 +128,7 @@ def begin(prepared: Prepared, folder: Any) -> tuple[Session, SessionStore]:  # n
     OutputError
         The folder is not empty or cannot be written.
     """
-    settings: dict[str, Any] = {"configuration": prepared.configuration.to_dict()}
-    if prepared.start is not None:
-        settings["start"] = {
-            "T_base_flange": prepared.start.T_base_flange.to_list(),
-            "joints_rad": list(prepared.start.joints_rad),
-            "posture_known": prepared.start.posture_known,
-        }
+    settings = settings_of(prepared.configuration, prepared.start)
     settings |= fingerprints(prepared.cell.arm, prepared.recorded)
     if not prepared.configuration.camera_known:
         cell, lens = prepared.cell, prepared.configuration.lens
@@ -171,7 +172,7 @@ def go_on(
         )
         check_fingerprints(store.settings, fingerprints(prepared.cell.arm, prepared.recorded))
         if prepared.hidden_arm is not None and start is not None:
-            prepared.hidden_arm.place(_left_at(store.entries) or start.joints_rad)
+            prepared.hidden_arm.place(left_at(store.entries) or start.joints_rad)
         session = prepared.session(store)
     except BaseException:
         store.close()
@@ -179,7 +180,7 @@ def go_on(
     return session, store, prepared
 
 
-def _left_at(entries: Sequence[Entry]) -> tuple[float, ...] | None:
+def left_at(entries: Sequence[Entry]) -> tuple[float, ...] | None:
     """Return the joints at which a simulated arm was left; None if it had not moved."""
     for entry in reversed(entries):
         if entry.standing_rad is not None:

@@ -8,11 +8,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from handeye.estimation import Estimate, Measurements
+from handeye.estimation import Estimate, Measurements, RigEstimate
 from handeye.planning import Pool, Proposal, Stop, StopReason
 from handeye.robots.protocol import Goal
-from handeye.session.entry import Entry
-from handeye.types import View
+from handeye.session.entry import TRANSIENT, Entry
+from handeye.session.starting import Start
+from handeye.types import Station, View
 from handeye.types.arrays import FloatArray
 from handeye.types.kinematics import Kinematics
 
@@ -38,36 +39,27 @@ FAILED = (EndReason.NO_START, EndReason.TOO_MANY_FAILURES, EndReason.ROBOT_HANGS
 
 
 @dataclass(frozen=True, eq=False)
-class Situation:
-    """Everything that a decision follows from, besides what was asked for.
+class Attempts:
+    """What was tried so far.
 
     Parameters
     ----------
     entries
         All attempts so far.
-    views
-        What they brought, without what was withdrawn.
-    measurements
-        Those of them to plan from: views that turned out wrong are left out.
-    estimate
-        What is believed; None after fewer than three views.
     forgiven
         How many of the attempts since the last view do not count any more: the session ended with them, and
         was told to go on.
     """
 
     entries: tuple[Entry, ...]
-    views: tuple[View, ...]
-    measurements: Measurements
-    estimate: Estimate | None
-    forgiven: int = 0
+    forgiven: int = field(default=0, kw_only=True)
 
     @cached_property
     def missed(self) -> list[Entry]:
-        """Return the attempts since the last view."""
+        """Return the attempts since the last view or station."""
         missed: list[Entry] = []
         for entry in reversed(self.entries):
-            if entry.view is not None:
+            if entry.brought is not None:
                 break
             missed.append(entry)
         return missed[::-1]
@@ -80,14 +72,67 @@ class Situation:
     @property
     def next_number(self) -> int:
         """Return the number of the next view: all that are in the journal are counted, usable or not."""
-        return 1 + sum(1 for entry in self.entries if entry.view is not None)
+        return 1 + sum(1 for entry in self.entries if entry.brought is not None)
 
-    def joints(self, view: View) -> tuple[float, ...]:
-        """Return the joints of a view; where nobody tells them, some that reach the goal."""
-        if view.joints_rad is not None:
-            return view.joints_rad
-        entry = next(e for e in self.entries if e.view is not None and e.view.name == view.name)
+    def label(self, what: str) -> str:
+        """Return the label of the next attempt at a view or station: its number, and that of the try."""
+        return f"{what}_{self.next_number:02d}.{1 + len(self.missed)}"
+
+    def joints(self, taken: View | Station) -> tuple[float, ...]:
+        """Return the joints of a view or station; where nobody tells them, some that reach the goal."""
+        if taken.joints_rad is not None:
+            return taken.joints_rad
+        entry = next(e for e in self.entries if e.brought is not None and e.brought.name == taken.name)
         return entry.goal_joints
+
+    def standing(self, start: Start) -> tuple[float, ...] | None:
+        """Return the joints where the arm stands, as far as the journal knows; None if nobody tells."""
+        if not start.posture_known:
+            return None
+        for entry in reversed(self.entries):
+            told = None if entry.brought is None else self.joints(entry.brought)
+            for joints in (entry.standing_rad, told, entry.goal_joints if entry.moved else None):
+                # Older sessions may hold readings that are not of this arm.
+                if joints is not None and len(joints) == len(start.joints_rad):
+                    return joints
+        return start.joints_rad
+
+    def too_many(self, most: int) -> "Halt | None":
+        """Return that too many attempts in a row brought nothing, None if they are fewer."""
+        if len(self.counted) < most:
+            return None
+        last = self.counted[-1]
+        return Halt(
+            EndReason.TOO_MANY_FAILURES,
+            f"{len(self.counted)} attempts in a row brought no view; the last: {last.failure}: {last.detail}",
+        )
+
+    def to_repeat(self, tries: int) -> Entry | None:
+        """Return the last attempt if it failed for no reason of its place, and is worth another try there."""
+        if not self.counted or self.counted[-1].failure not in TRANSIENT:
+            return None
+        last = self.counted[-1]
+        done = sum(1 for entry in self.counted if entry.goal_joints == last.goal_joints)
+        return None if done >= tries else last
+
+
+@dataclass(frozen=True, eq=False)
+class Situation(Attempts):
+    """Everything that a decision follows from with one camera, besides what was asked for.
+
+    Parameters
+    ----------
+    views
+        What the attempts brought, without what was withdrawn.
+    measurements
+        Those of them to plan from: views that turned out wrong are left out.
+    estimate
+        What is believed; None after fewer than three views.
+    """
+
+    views: tuple[View, ...]
+    measurements: Measurements
+    estimate: Estimate | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +155,10 @@ class Considered:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What to do next, how it was decided, from what, and how many seconds that took."""
+    """What to do next, how it was decided, from what, and how many seconds that took.
+
+    `believed` is what is believed of several cameras; `estimate` of one.
+    """
 
     goal: Goal
     phase: str
@@ -118,6 +166,7 @@ class Step:
     estimate: Estimate | None
     seconds: float = 0.0
     considered: Considered | None = None
+    believed: RigEstimate | None = None
 
 
 @dataclass(frozen=True)

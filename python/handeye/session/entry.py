@@ -1,11 +1,11 @@
-"""One attempt at a view, as the journal keeps it."""
+"""One attempt at a view or a station, as the journal keeps it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from handeye.types import Pose, View
+from handeye.types import CameraView, Pose, Station, View
 from handeye.types.plain import Document, read_document, without_none
 
 
@@ -45,6 +45,12 @@ TRANSIENT = frozenset(
 )
 
 
+class _SeenDocument(Document):
+    camera: str
+    target: str
+    view: dict[str, Any]
+
+
 class _EntryDocument(Document):
     number: int
     label: str
@@ -53,11 +59,13 @@ class _EntryDocument(Document):
     goal_joints: list[float]
     moved: bool
     view: dict[str, Any] | None = None
+    station: list[_SeenDocument] | None = None
     failure: Failure | None = None
     detail: str = ""
     decision: dict[str, Any] = {}  # noqa: RUF012 - msgspec copies an empty default
     timings_s: dict[str, float] = {}  # noqa: RUF012
     image_digest: str | None = None
+    image_digests: list[str] = []  # noqa: RUF012
     standing_rad: list[float] | None = None
     withdraws: str | None = None
 
@@ -79,19 +87,21 @@ class Entry:
     moved
         Whether it went there, as far as is known.
     view
-        What came of it; None if nothing.
+        What came of it with one camera; None if nothing.
     failure, detail
         Why nothing came of it.
     decision
         Scores of all candidates, what was predicted, and how many candidates were turned down for what.
     timings_s
         Seconds that deciding, moving, exposing and detecting took.
-    image_digest
-        Of the image, to notice one that comes twice.
+    digests
+        Of the images, to notice one that comes twice.
     standing_rad
         Joints where the robot said that it stood afterwards; None if it did not say.
     withdraws
-        Name of a view that does not count any more; nothing was attempted then.
+        Name of a view or station that does not count any more; nothing was attempted then.
+    station
+        What came of it with several cameras; None if nothing.
     """
 
     number: int
@@ -105,9 +115,15 @@ class Entry:
     detail: str = ""
     decision: Mapping[str, Any] = field(default_factory=dict[str, Any])
     timings_s: Mapping[str, float] = field(default_factory=dict[str, float])
-    image_digest: str | None = None
+    digests: tuple[str, ...] = ()
     standing_rad: tuple[float, ...] | None = None
     withdraws: str | None = None
+    station: Station | None = None
+
+    @property
+    def brought(self) -> View | Station | None:
+        """The view or station that came of it; None if nothing."""
+        return self.station if self.view is None else self.view
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; `from_dict` reads them back."""
@@ -119,11 +135,18 @@ class Entry:
             goal_joints=list(self.goal_joints),
             moved=self.moved,
             view=None if self.view is None else self.view.to_dict(),
+            station=None
+            if self.station is None
+            else [
+                {"camera": one.camera, "target": one.target, "view": one.view.to_dict()}
+                for one in self.station.views
+            ],
             failure=None if self.failure is None else self.failure.value,
             detail=self.detail,
             decision=dict(self.decision),
             timings_s=dict(self.timings_s),
-            image_digest=self.image_digest,
+            image_digest=self.digests[0] if len(self.digests) == 1 else None,
+            image_digests=list(self.digests) if len(self.digests) > 1 else None,
             standing_rad=None if self.standing_rad is None else list(self.standing_rad),
             withdraws=self.withdraws,
         )
@@ -150,9 +173,16 @@ class Entry:
             document.detail,
             document.decision,
             document.timings_s,
-            document.image_digest,
+            (*([] if document.image_digest is None else [document.image_digest]), *document.image_digests),
             None if document.standing_rad is None else tuple(document.standing_rad),
             document.withdraws,
+            None
+            if document.station is None
+            else Station(
+                tuple(
+                    CameraView(one.camera, one.target, View.from_dict(one.view)) for one in document.station
+                )
+            ),
         )
 
 
@@ -160,3 +190,10 @@ def views_of(entries: Sequence[Entry]) -> list[View]:
     """Return the views that attempts brought, without those that were withdrawn."""
     withdrawn = {entry.withdraws for entry in entries}
     return [entry.view for entry in entries if entry.view is not None and entry.view.name not in withdrawn]
+
+
+def stations_of(entries: Sequence[Entry]) -> list[Station]:
+    """Return the stations that attempts brought, without those that were withdrawn."""
+    withdrawn = {entry.withdraws for entry in entries}
+    found = [entry.station for entry in entries if entry.station is not None]
+    return [station for station in found if station.name not in withdrawn]

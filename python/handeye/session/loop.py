@@ -3,7 +3,6 @@
 What happens next is a function of the journal and the seed alone: after a break the same decisions follow.
 """
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -13,12 +12,11 @@ from handeye.estimation.confidence import Within
 from handeye.estimation.faults import Examination, examine
 from handeye.estimation.lens_confidence import lens_within_px
 from handeye.session.attempt import Cell
-from handeye.session.contract import check_at_rest
-from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation, Step
-from handeye.session.entry import Entry, Failure, views_of
+from handeye.session.deciding import FAILED, START_VIEWS, Chooser, EndReason, Halt, Situation
+from handeye.session.entry import Entry, views_of
 from handeye.session.judging import all_agree
+from handeye.session.stepping import Stepping
 from handeye.session.store import SessionStore
-from handeye.session.taking import Taker
 from handeye.session.wish import Wish
 from handeye.types import View
 from handeye.types.calibration import Calibration, ModelName
@@ -44,8 +42,8 @@ class End:
     lens_px: float | None = None
 
 
-class Session:
-    """Runs the loop on a cell and writes every attempt into a store.
+class Session(Stepping[Situation, End]):
+    """The loop with one camera and one target.
 
     Parameters
     ----------
@@ -66,70 +64,22 @@ class Session:
         chooser: Chooser,
         wish: Wish,
     ) -> None:
-        self._cell = cell
+        super().__init__(cell, store, chooser.choose)
         self._store = store
-        self._chooser = chooser
         self._wish = wish
-        self._taker = Taker(cell, store)
         known = wish.joints_err and wish.model is ModelName.AUTO
         self._kinematics = chooser.kinematics if known else None
         self._estimator: Estimator = make_estimator(wish.model, self._kinematics)
         # Where no camera was given there is none until the views teach one.
         self._learning = store.self_calibration
         self._measurements = self._no_measurements()
-        self._forgiven_up_to: int | None = None
 
-    def run(self) -> End:
-        """Run until the end; an interruption stops the arm first and leaves the session whole.
-
-        Raises
-        ------
-        DeviceError
-            The robot does not keep the contract where it stands; nothing was sent to it.
-        OutputError
-            The disk does not take an attempt, also not when asked again.
-        """
-        check_at_rest(self._cell)
-        try:
-            while True:
-                step = self.next()
-                if isinstance(step, End):
-                    return step
-                self.take(step)
-        except BaseException:
-            self._cell.stop()
-            raise
-
-    def next(self) -> Step | End:
-        """Decide what to do next, without doing it."""
-        began = time.monotonic()
-        if self._cell.robot_calls.pending:
-            return self._end(
-                EndReason.ROBOT_HANGS,
-                "the last command to the robot has not come back, and nothing more is sent to it; "
-                "the arm may still move",
-            )
+    def _situation(self) -> Situation | Halt:
         views = self._usable()
         measurements, estimate = self._planned_from(views)
         if len(measurements) < len(views) and len(views) >= self._wish.most_views:
-            return self._end(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
-        attempts = tuple(entry for entry in self._store.entries if entry.withdraws is None)
-        answer = self._choose(Situation(attempts, tuple(views), measurements, estimate))
-        if isinstance(answer, Step):
-            return replace(answer, seconds=time.monotonic() - began)
-        return self._end(answer.reason, answer.sentence)
-
-    def _choose(self, situation: Situation) -> Step | Halt:
-        """Choose; a session that had ended in failures when it was opened gets as many attempts again."""
-        if self._forgiven_up_to is None:
-            self._forgiven_up_to = 0
-            if situation.missed:
-                first = self._chooser.choose(situation)
-                if not isinstance(first, Halt) or first.reason not in FAILED:
-                    return first
-                self._forgiven_up_to = situation.entries[-1].number
-        forgiven = sum(1 for entry in situation.missed if entry.number <= self._forgiven_up_to)
-        return self._chooser.choose(replace(situation, forgiven=forgiven))
+            return Halt(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
+        return Situation(self._entries(), tuple(views), measurements, estimate)
 
     @property
     def views(self) -> tuple[View, ...]:
@@ -154,18 +104,6 @@ class Session:
             if (len(view.joints_rad) == len(arm) if view.joints_rad is not None else not needed)
         ]
 
-    def take(self, step: Step) -> Entry:
-        """Do a step, and write down what it brought.
-
-        Raises
-        ------
-        OutputError
-            The disk does not take it.
-        """
-        entry = self._taker.take(step)
-        self._cell.observer.taken(entry, step.estimate)
-        return entry
-
     def withdraw(self, name: str, why: str) -> Entry:
         """Take a view back: it stays in the journal, and counts no more.
 
@@ -176,23 +114,9 @@ class Session:
         OutputError
             The disk does not take it.
         """
-        view = next((view for view in self.views if view.name == name), None)
-        if view is None:
+        if name not in {view.name for view in self.views}:
             raise InputError(f"view {name[:60]}: no view of this session", code="unknown_view")
-        entry = Entry(
-            len(self._store.entries) + 1,
-            name,
-            "withdraw",
-            view.T_base_flange,
-            (),
-            moved=False,
-            failure=Failure.WITHDRAWN,
-            detail=why,
-            withdraws=name,
-        )
-        self._store.append(entry)
-        self._cell.observer.taken(entry, None)
-        return entry
+        return self._withdraw(name, why)
 
     def _no_measurements(self) -> Measurements:
         return Measurements.of(self._store.begun_with.mounting, self._cell.camera, self._cell.target)

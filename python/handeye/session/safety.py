@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from handeye.estimation import Estimate
+from handeye.estimation import Estimate, RigEstimate
 from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import mounted_points
+from handeye.planning.rig import mounted_on_flange
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
 from handeye.robots.motion import AGREEMENT_M, AGREEMENT_RAD
@@ -16,13 +17,17 @@ from handeye.types import Pose
 
 # Rounding of degrees and radians is no faster motion.
 _SPEED_TOLERANCE = 1e-9
+# What is believed of one camera, or of several.
+Believed = Estimate | RigEstimate
 
 
-def body_of(arm: Arm, workspace: Workspace, solids: SolidLinks | None, estimate: Estimate | None) -> Body:
-    """Return the arm with what is mounted on it, as far as the estimate knows."""
-    if estimate is None:
+def body_of(arm: Arm, workspace: Workspace, solids: SolidLinks | None, believed: Believed | None) -> Body:
+    """Return the arm with what is mounted on it, as far as is known."""
+    if believed is None:
         return Body(arm, workspace, solids=solids)
-    return Body(arm, workspace, mounted_points(estimate), solids)
+    if isinstance(believed, RigEstimate):
+        return Body(arm, workspace, mounted_on_flange(believed), solids)
+    return Body(arm, workspace, mounted_points(believed), solids)
 
 
 def objection_to_motion(

@@ -53,6 +53,25 @@ class Simulation:
 
 
 @dataclass(frozen=True)
+class RigSettings:
+    """A run with several cameras.
+
+    Parameters
+    ----------
+    cameras
+        Those that take part; None for all.
+    camera_to_camera
+        Radii (mm, deg) for cameras of one body in each other; None if they are not asked for.
+    candidates
+        Postures drawn at every step.
+    """
+
+    cameras: tuple[str, ...] | None = None
+    camera_to_camera: tuple[float, float] | None = None
+    candidates: int = 600
+
+
+@dataclass(frozen=True)
 class Configuration:
     """A run, in plain values.
 
@@ -74,6 +93,8 @@ class Configuration:
         How well such a camera is to be known, see `Wish`.
     touch_mm, work
         Touch error to reach in place of the accuracy, and what is seen and touched.
+    rig
+        What there is to say of several cameras; None for one.
     anyway
         Go on although the accuracy is out of reach, see `Wish`.
     """
@@ -103,6 +124,7 @@ class Configuration:
     simulation: Simulation = field(default_factory=Simulation)
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
+    rig: RigSettings | None = None
     anyway: bool = False
 
     @property
@@ -136,6 +158,7 @@ class Configuration:
             accuracy_px=None if self.camera_known else self.accuracy_px,
             touch_mm=self.touch_mm,
             work=self.work,
+            camera_to_camera=None if self.rig is None else self.rig.camera_to_camera,
             anyway=self.anyway,
         )
 
@@ -176,6 +199,18 @@ class Configuration:
             document["timeouts"] = document.pop("patience")
             return read_document(document, cls, "settings")
         return read_document(data, cls, "settings")
+
+
+def settings_of(configuration: Configuration, start: Start | None) -> dict[str, Any]:
+    """Return plain values of what was asked for and of where the arm stands, see `read_start`."""
+    settings: dict[str, Any] = {"configuration": configuration.to_dict()}
+    if start is not None:
+        settings["start"] = {
+            "T_base_flange": start.T_base_flange.to_list(),
+            "joints_rad": list(start.joints_rad),
+            "posture_known": start.posture_known,
+        }
+    return settings
 
 
 def read_start(settings: Mapping[str, Any]) -> Start:

@@ -48,9 +48,9 @@ class Start:
 
 def starting_goal(
     start: Start,
-    views: Sequence[View],
+    number: int,
     failures: int,
-    camera: Camera,
+    tilt_rad: float,
     body: Body,
     standing_rad: Sequence[float] | None,
 ) -> tuple[Pose, FloatArray] | None:
@@ -58,22 +58,24 @@ def starting_goal(
 
     Parameters
     ----------
-    views
+    number
         Views so far.
     failures
         Attempts at the next view that failed since the last view.
+    tilt_rad
+        Largest tilt, see `largest_tilt_rad`.
     body
         The arm, as far as it is known with what is mounted on it.
     standing_rad
         (n,) joints where the arm stands now, from where the way must be free; None if nobody tells.
     """
-    if not views:
+    if number == 0:
         return start.T_base_flange, np.array(start.joints_rad)
-    if len(views) >= MOST_VIEWS:
+    if number >= MOST_VIEWS:
         return None
     arm = body.arm
     for trial in range(failures, failures + 6):
-        pose = start.T_base_flange @ Pose.exp(_twist(views, trial, camera))
+        pose = start.T_base_flange @ Pose.exp(_turn(number, trial, tilt_rad))
         joints, reached = arm.inverse_all(pose.matrix[np.newaxis], np.array(start.joints_rad), attempts=1)
         if not reached[0]:
             continue
@@ -96,9 +98,10 @@ def preview(start: Start, body: Body, count: int) -> list[tuple[Pose, FloatArray
     return found
 
 
-def _twist(views: Sequence[View], trial: int, camera: Camera) -> FloatArray:
-    room = _room_px(views[0], camera) / float(camera.parameters[:2].max())
-    return _turn(len(views), trial, float(np.clip(ROOM_SHARE * room, SMALLEST_TILT_RAD, LARGEST_TILT_RAD)))
+def largest_tilt_rad(first: View, camera: Camera) -> float:
+    """Return the largest turn about an axis in the image that the room around the first view allows."""
+    room = _room_px(first, camera) / float(camera.parameters[:2].max())
+    return float(np.clip(ROOM_SHARE * room, SMALLEST_TILT_RAD, LARGEST_TILT_RAD))
 
 
 def _turn(number: int, trial: int, tilt_rad: float) -> FloatArray:

@@ -13,10 +13,11 @@ lost. What the recording holds and the journal lacks is never deleted: such a se
 
 import os
 import stat
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Self, TypeVar
 
 from handeye.datasets import write_recording
 from handeye.datasets.reading import existing_folder, is_file, reason
@@ -34,36 +35,62 @@ from handeye.session.journal import (
     read_settings,
 )
 from handeye.session.self_calibration import SelfCalibration, same_camera
-from handeye.types import Recording, Truth, View
+from handeye.types import Recording, Station, Truth, View
 
 RECORDING_FILE = "recording.toml"
+K = TypeVar("K", View, Station)
+S = TypeVar("S", bound="Store")
 
 
-class SessionStore:
-    """The folder of one session, open for one process at a time.
+class Store(ABC):
+    """The folder of one session, open for one process at a time; of one camera or of several.
 
-    Use `create_session` or `open_session`; close it at the end. `begun_with` is the recording before its
-    first view, and `self_calibration` finds the camera where none was given.
+    Close it at the end. `self_calibration` finds the camera where none was given.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        settings: Mapping[str, Any],
-        recording: Recording,
-        journal: Journal,
-        lock: IO[bytes],
-        begun_with: Recording,
-        self_calibration: SelfCalibration | None = None,
-    ) -> None:
+    def __init__(self, folder: Path, settings: Mapping[str, Any], journal: Journal, lock: IO[bytes]) -> None:
         self.folder = folder
         self.settings = settings
-        self.begun_with = begun_with
-        self.self_calibration = self_calibration
-        self._recording = recording
-        self._on_disk = RecordingFolder(folder)
+        self.self_calibration: SelfCalibration | None = None
         self._journal = journal
         self._lock = lock
+
+    @classmethod
+    @abstractmethod
+    def of(cls, root: Path, settings: Settings, journal: Journal, lock: IO[bytes]) -> tuple[Self, bool]:
+        """Return the store of a folder, and whether its recording is as the journal has it.
+
+        Nothing is written but a recording that is lost altogether.
+
+        Raises
+        ------
+        InputError
+            The recording holds what the journal lacks, or was edited.
+        """
+
+    @abstractmethod
+    def bring_up_to_date(self) -> None:
+        """Write the recording that follows from the journal.
+
+        Raises
+        ------
+        OutputError
+            The system refuses to write.
+        """
+
+    @abstractmethod
+    def views_through(self, camera: str, target: str) -> list[View]:
+        """Return the views of one target through one camera."""
+
+    @abstractmethod
+    def check(self, pair: tuple[str, str], view: View) -> None:
+        """Check that a view of a pair may be added.
+
+        Raises
+        ------
+        InputError
+            It may not.
+        """
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -79,11 +106,6 @@ class SessionStore:
             f"{self.folder / JOURNAL_FILE}: the last line was not written to its end ({self._journal.torn} "
             f"bytes) and is left out; {len(self.entries)} attempts are whole, and the session goes on there"
         )
-
-    @property
-    def recording(self) -> Recording:
-        """The recording of the views so far."""
-        return self._recording
 
     def keep_image(self, name: str, png: bytes) -> str:
         """Write the image of a view; return its path in the folder. Writing it again replaces it.
@@ -102,7 +124,7 @@ class SessionStore:
         return path
 
     def append(self, entry: Entry) -> None:
-        """Add an attempt; on return it is on the disk, and the recording holds its view.
+        """Add an attempt; on return it is on the disk, and the recording holds what it brought.
 
         Raises
         ------
@@ -111,8 +133,76 @@ class SessionStore:
             recording lags behind, to be brought up to date with the next view or the next opening.
         """
         self._journal.append(entry)
-        if entry.view is not None or entry.withdraws is not None:
+        if entry.brought is not None or entry.withdraws is not None:
             self.bring_up_to_date()
+
+    def close(self) -> None:
+        """Let another process open the session."""
+        self._lock.close()
+
+
+class SessionStore(Store):
+    """The session of one camera; `begun_with` is the recording before its first view.
+
+    Use `create_session` or `open_session`.
+    """
+
+    begun_with: Recording
+    _recording: Recording
+    _on_disk: RecordingFolder
+
+    @property
+    def recording(self) -> Recording:
+        """The recording of the views so far."""
+        return self._recording
+
+    @classmethod
+    def of(cls, root: Path, settings: Settings, journal: Journal, lock: IO[bytes]) -> tuple[Self, bool]:
+        """Return the store of a folder, and whether its recording is as the journal has it.
+
+        Raises
+        ------
+        InputError
+            The recording holds what the journal lacks, or was edited.
+        """
+        store = cls(root, settings.asked, journal, lock)
+        base = None if settings.recording is None else Recording.from_dict(settings.recording)
+        store.self_calibration = None if base is None else SelfCalibration.of_session(settings.asked, base)
+        views = views_of(journal.entries)
+        path = root / RECORDING_FILE
+        if base is not None and not path.exists() and not path.is_symlink():
+            write_empty_recording(base, root)
+            current = False
+        else:
+            found = read_views_apart(root)
+            base = found.recording if base is None else base
+            kept = _with_camera_of(base, found, journal, store.self_calibration)
+            taken = [entry.view for entry in journal.entries if entry.view is not None]
+            check_same(path, kept.to_dict() == base.to_dict(), found.views, taken, same_view)
+            current = is_current(found.views, views)
+        store.begun_with, store._recording = base, store._grown(base)
+        store._on_disk = RecordingFolder(root)
+        return store, current
+
+    def _grown(self, recording: Recording) -> Recording:
+        grown = recording.with_views(views_of(self.entries))
+        return grown if self.self_calibration is None else self.self_calibration.put_into(grown)
+
+    def views_through(self, camera: str, target: str) -> list[View]:
+        """Return the views of the one target through the one camera."""
+        del camera, target
+        return list(self._recording.views)
+
+    def check(self, pair: tuple[str, str], view: View) -> None:
+        """Check that a view may be added.
+
+        Raises
+        ------
+        InputError
+            It may not.
+        """
+        del pair
+        self._recording.with_views((*self._recording.views, view))
 
     def reveal(self, truth: Truth) -> None:
         """Write what is true into the recording, once a simulated session has ended.
@@ -125,10 +215,6 @@ class SessionStore:
         self._recording = replace(self._recording, truth=truth)
         self._on_disk.update(self._recording)
 
-    def close(self) -> None:
-        """Let another process open the session."""
-        self._lock.close()
-
     def bring_up_to_date(self) -> None:
         """Write the recording that follows from the journal.
 
@@ -137,8 +223,7 @@ class SessionStore:
         OutputError
             The system refuses to write.
         """
-        grown = self._recording.with_views(views_of(self.entries))
-        self._recording = grown if self.self_calibration is None else self.self_calibration.put_into(grown)
+        self._recording = self._grown(self._recording)
         self._on_disk.update(self._recording)
 
 
@@ -151,16 +236,28 @@ def create_session(folder: Path, recording: Recording, settings: Mapping[str, An
         The folder is not empty, or the system refuses to write.
     """
     empty = recording.with_views(())
-    asked = Settings(settings, replace(empty, truth=None).to_dict()).to_bytes()
-    with new_folder(folder) as partial:
-        write_recording(empty, partial)
-        write_file(partial / SETTINGS_FILE, asked)
-        write_file(partial / JOURNAL_FILE, b"")
+    asked = Settings(settings, replace(empty, truth=None).to_dict())
+    create(folder, asked, lambda partial: write_recording(empty, partial))
     return open_session(folder)
 
 
+def create(folder: Path, asked: Settings, write: Callable[[Path], None]) -> None:
+    """Make the folder of a new session, its empty recording written by `write`: all of it or nothing.
+
+    Raises
+    ------
+    OutputError
+        The folder is not empty, or the system refuses to write.
+    """
+    content = asked.to_bytes()
+    with new_folder(folder) as partial:
+        write(partial)
+        write_file(partial / SETTINGS_FILE, content)
+        write_file(partial / JOURNAL_FILE, b"")
+
+
 def open_session(folder: Path) -> SessionStore:
-    """Open a session to go on with it.
+    """Open a session of one camera to go on with it.
 
     Raises
     ------
@@ -169,17 +266,21 @@ def open_session(folder: Path) -> SessionStore:
     OutputError
         The recording lags behind the journal and cannot be written.
     """
+    return opened(folder, SessionStore)
+
+
+def opened(folder: Path, kind: type[S]) -> S:
+    """Open a session of a kind, see `open_session`."""
     root = existing_folder(folder)
     settings = read_settings(root)
     lock = _locked(root / JOURNAL_FILE)
     try:
         # Everything is compared before anything is written.
         journal = read_journal(root, settings)
-        begun_with, recording, current, learning = _recording_of(root, settings, journal)
+        store, current = kind.of(root, settings, journal, lock)
         journal.mend()
         for part in (root, root / "corners", root / "images"):
             remove_partials(part)
-        store = SessionStore(root, settings.asked, recording, journal, lock, begun_with, learning)
         if not current:
             store.bring_up_to_date()
     except BaseException:
@@ -193,76 +294,74 @@ def is_session(folder: Path) -> bool:
     return is_file(folder / SETTINGS_FILE) and is_file(folder / JOURNAL_FILE)
 
 
-def _recording_of(
-    root: Path, settings: Settings, journal: Journal
-) -> tuple[Recording, Recording, bool, SelfCalibration | None]:
-    """Return the recording as it began, as it follows from the journal, and whether that lies on the disk.
+def _with_camera_of(
+    base: Recording, found: ViewsApart, journal: Journal, learning: SelfCalibration | None
+) -> Recording:
+    """Return a recording without views, with its first camera where its own follows from views."""
+    if learning is None:
+        return found.recording
+    known = {entry.view.name: entry.view for entry in journal.entries if entry.view is not None}
+    views = [known[name] for name in found.views if name in known]
+    then = learning.put_into(base.with_views(views)).camera
+    if not same_camera(found.recording.camera, then):
+        return found.recording
+    return replace(found.recording, camera=base.camera)
 
-    Last what finds the camera, where none was given.
 
-    Raises
-    ------
-    InputError
-        The recording holds what the journal lacks, or was edited.
-    """
-    views = views_of(journal.entries)
-    taken = [entry.view for entry in journal.entries if entry.view is not None]
-    base = None if settings.recording is None else Recording.from_dict(settings.recording)
-    path = root / RECORDING_FILE
-    learning = None if base is None else SelfCalibration.of_session(settings.asked, base)
-
-    def grown(begun_with: Recording) -> Recording:
-        recording = begun_with.with_views(views)
-        return recording if learning is None else learning.put_into(recording)
-
-    if base is not None and not path.exists() and not path.is_symlink():
-        write_empty_recording(base, root)
-        return base, grown(base), False, learning
-    found = read_views_apart(root)
-    if base is None:
-        base = found.recording
-    _check_same(path, base, found, taken, learning)
-    current = list(found.views) == [view.name for view in views] and not any(
-        isinstance(view, InputError) for view in found.views.values()
+def is_current(found: Mapping[str, K | InputError], expected: Sequence[K]) -> bool:
+    """Tell whether a recording holds whole what the journal has."""
+    return list(found) == [one.name for one in expected] and not any(
+        isinstance(one, InputError) for one in found.values()
     )
-    return base, grown(base), current, learning
 
 
-def _check_same(
-    path: Path, base: Recording, found: ViewsApart, views: list[View], learning: SelfCalibration | None
+def check_same(
+    path: Path,
+    same_header: bool,
+    found: Mapping[str, K | InputError],
+    taken: Sequence[K],
+    same: Callable[[K, K], bool],
 ) -> None:
     """Refuse a recording that holds what the journal lacks.
+
+    Parameters
+    ----------
+    path
+        Its file.
+    same_header
+        Whether all but its views is what the session began with.
+    found
+        Its views or stations by name, or what is wrong with them.
+    taken
+        Those of the journal.
+    same
+        Tells whether one is that of the journal.
 
     Raises
     ------
     InputError
         It does.
     """
-    known = {view.name: view for view in views}
-    more = [name for name in found.views if name not in known]
+    known = {one.name: one for one in taken}
+    more = [name for name in found if name not in known]
     if more:
         raise InputError(
             f"{path}: holds {', '.join(more[:10])}, which no attempt in the journal took: it was cut "
-            f"after {len(views)} views",
+            f"after {len(taken)} views",
             code="journal_cut",
             hint=f"restore {JOURNAL_FILE} from a copy; handeye solve uses the recording as it is",
         )
-    kept = found.recording
-    if learning is not None:
-        then = learning.put_into(base.with_views(known[name] for name in found.views)).camera
-        if same_camera(kept.camera, then):
-            kept = replace(kept, camera=base.camera)
-    if kept.to_dict() != base.to_dict():
+    if not same_header:
         raise InputError(
             f"{path}: name, source, mounting, camera or target are not those that the session began with",
             code="edited",
             hint="undo the change, or begin a new session",
         )
-    for name, view in found.views.items():
-        if isinstance(view, InputError):
-            if view.code != "missing_file":
-                raise view
-        elif not _same(view, known[name]):
+    for name, one in found.items():
+        if isinstance(one, InputError):
+            if one.code != "missing_file":
+                raise one
+        elif not same(one, known[name]):
             raise InputError(
                 f"{path}: view {name} is not as in the journal: its row or its corners were edited",
                 code="edited",
@@ -270,7 +369,8 @@ def _check_same(
             )
 
 
-def _same(view: View, known: View) -> bool:
+def same_view(view: View, known: View) -> bool:
+    """Tell whether a view is that of the journal, but for an image that may be lost."""
     one, other = view.to_dict(), known.to_dict()
     if one.get("image") is None:  # lost, and not kept in the journal
         other.pop("image", None)

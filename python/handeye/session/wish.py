@@ -41,6 +41,8 @@ class Wish:
         What is seen and touched.
     refine
         Climb from the best candidates to better ones near them, rather than take the best that was drawn.
+    camera_to_camera
+        With several cameras: radii (mm, deg) for those of one body in each other; None for none.
     anyway
         Go on to the most views although the accuracy asked for is out of reach.
     accuracy_px
@@ -67,6 +69,7 @@ class Wish:
     accuracy_px: float | None = None
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
+    camera_to_camera: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         self.rules()  # checks what they check

@@ -177,15 +177,23 @@ class SimulatedRig:
         """Return camera, board and pixels (P, 2) of every board that is seen whole."""
         found: list[tuple[str, str, FloatArray]] = []
         for camera in self.given:
-            for target, board in BOARDS.items():
-                if self.given[camera].body is board.body is Body.FLANGE:
-                    continue  # the board on the flange hangs where its cameras do not look
-                if self.sees(camera, target, T_base_flange):
-                    pose = self.T_camera_target(camera, target, T_base_flange)
-                    pixels = self.pixels(camera, board.target, pose)
-                    noise = self.pixel_sigma_px[camera] * random.standard_normal(pixels.shape)
-                    found.append((camera, target, pixels + noise))
+            for target in BOARDS:
+                pixels = self.seen(camera, target, T_base_flange, random)
+                if pixels is not None:
+                    found.append((camera, target, pixels))
         return found
+
+    def seen(
+        self, camera: str, target: str, T_base_flange: Pose, random: np.random.Generator
+    ) -> FloatArray | None:
+        """Return the pixels (P, 2) of a board that a camera sees whole, None if it does not."""
+        board = BOARDS[target]
+        if self.given[camera].body is board.body is Body.FLANGE:
+            return None  # the board on the flange hangs where its cameras do not look
+        if not self.sees(camera, target, T_base_flange):
+            return None
+        pixels = self.pixels(camera, board.target, self.T_camera_target(camera, target, T_base_flange))
+        return pixels + self.pixel_sigma_px[camera] * random.standard_normal(pixels.shape)
 
     def pixels(self, camera: str, target: Target, T_camera_target: Pose) -> FloatArray:
         """(P, 2) where the points of a board truly are in the image of a camera."""
@@ -193,11 +201,6 @@ class SimulatedRig:
             LENS, self.true[camera].parameters, T_camera_target.matrix, target.points, target.radii_m
         )
         return pixels
-
-
-def chance_of(seed: int, label: str) -> np.random.Generator:
-    """Return the chance of what is seen under a label: the same after a break."""
-    return np.random.default_rng([seed, 12, zlib.crc32(label.encode())])
 
 
 def seen_targets(rig: SimulatedRig, cameras: Sequence[str]) -> tuple[str, ...]:

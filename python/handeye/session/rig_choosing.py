@@ -1,0 +1,218 @@
+"""Choosing where an arm goes next with several cameras: small turns first, then where all of them learn most.
+
+The chance in a decision follows from the seed and the attempts so far.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handeye.estimation import RigEstimate
+from handeye.planning.candidates import Candidate, Pool
+from handeye.planning.collisions import Workspace
+from handeye.planning.constraints import ViewLimits
+from handeye.planning.prediction import Sight
+from handeye.planning.rig import FEWEST_STATIONS, RigRequest, rig_gains
+from handeye.planning.solids import SolidLinks
+from handeye.robots import Arm, ArmKinematics
+from handeye.robots.protocol import Goal
+from handeye.session.deciding import Attempts, EndReason, Halt, Step
+from handeye.session.safety import body_of
+from handeye.session.starting import Start, largest_tilt_rad, starting_goal
+from handeye.session.wish import Wish
+from handeye.types import MountedCamera, Pose, Station
+from handeye.types.arrays import FloatArray
+
+# Postures are drawn about those of the stations, some near and some far.
+SPREADS_RAD = (0.1, 0.8)
+# Candidates whose straight path is looked at.
+MOST_PATHS = 24
+# What a belief may be off in the image.
+SAFETY_PX = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class RigSituation(Attempts):
+    """Everything that a decision follows from with several cameras, besides what was asked for.
+
+    Parameters
+    ----------
+    stations
+        What the attempts brought, without what was withdrawn.
+    believed
+        What is believed; None while the stations do not determine every camera.
+    """
+
+    stations: tuple[Station, ...]
+    believed: RigEstimate | None
+
+
+class RigChooser:
+    """Chooses goals for an arm that is described, and several cameras.
+
+    Parameters
+    ----------
+    arm, workspace
+        The arm, and what no motion may leave.
+    cameras
+        By name.
+    start
+        Where the arm stood when the session began.
+    wish
+        What is asked for.
+    solids
+        The shapes of the links; None to judge them by capsules.
+    candidates
+        Postures drawn at every step.
+    limits
+        What makes a view usable.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        workspace: Workspace,
+        cameras: Mapping[str, MountedCamera],
+        start: Start,
+        wish: Wish,
+        solids: SolidLinks | None = None,
+        *,
+        candidates: int,
+        limits: ViewLimits,
+    ) -> None:
+        self._arm, self._workspace, self._solids = arm, workspace, solids
+        self._cameras, self._start, self._wish = cameras, start, wish
+        self._request = request_of(wish)
+        self._candidates = candidates
+        self._limits = limits
+        self._sight = Sight(margin_px=limits.margin_px + SAFETY_PX, fewest=limits.fewest)
+
+    @property
+    def kinematics(self) -> ArmKinematics | None:
+        """The arm; None if nobody tells joints, or it shall not take part in the estimate."""
+        known = self._start.posture_known and self._wish.joints_err
+        return ArmKinematics(self._arm) if known else None
+
+    def choose(self, situation: RigSituation) -> Step | Halt:
+        """Return the next step, or why there is none."""
+        count, believed = len(situation.stations), situation.believed
+        if believed is not None and self._met(believed, count):
+            mm, deg = _worst(believed)
+            reached = f"every camera within {mm:.2g} mm and {deg:.2g} deg"
+            return Halt(EndReason.ACCURACY_REACHED, f"with 95 % probability {reached}, as asked")
+        if count >= self._wish.most_views:
+            return Halt(EndReason.VIEWS_TAKEN, f"{count} stations taken, as asked")
+        halt = situation.too_many(self._wish.failures_in_a_row)
+        if halt is not None:
+            return halt
+        last = situation.to_repeat(self._wish.tries_at_a_place)
+        if last is not None:
+            goal = Goal(situation.label("station"), last.goal, last.goal_joints, self._wish.speed_rad_s)
+            return Step(goal, "retry", {"after": last.number}, None, believed=believed)
+        if believed is None:
+            return self._starting(situation)
+        return self._planned(situation, believed)
+
+    def _met(self, believed: RigEstimate, count: int) -> bool:
+        return self._request is not None and count >= FEWEST_STATIONS and not self._request.missing(believed)
+
+    def _random(self, situation: RigSituation) -> np.random.Generator:
+        return np.random.default_rng([self._wish.seed, 4, len(situation.entries)])
+
+    def _starting(self, situation: RigSituation) -> Step | Halt:
+        """Turn a little about the start; less, and the other way, after a turn that lost a target."""
+        stations = situation.stations
+        seen = [{(one.camera, one.target) for one in station.views} for station in stations]
+        whole = [k for k, pairs in enumerate(seen) if pairs >= seen[0]]
+        # Stations that lost some of what was seen at first are kept, and are failures of the turn.
+        lost = len(stations) - 1 - whole[-1] if stations else 0
+        tilts = [
+            largest_tilt_rad(one.view, self._cameras[one.camera].camera)
+            for station in stations[:1]
+            for one in station.views
+        ]
+        found = starting_goal(
+            self._start,
+            len(whole),
+            lost + len(situation.counted),
+            min(tilts, default=0.0),
+            body_of(self._arm, self._workspace, self._solids, situation.believed),
+            situation.standing(self._start),
+        )
+        if found is None:
+            blind = [name for name in self._cameras if all(name != c for pairs in seen for c, _ in pairs)]
+            return Halt(
+                EndReason.NO_START,
+                f"not tied to the arm by turns about where it stands: {', '.join(blind or self._cameras)}; "
+                "drive it to where every camera sees a target, away from the ends of the workspace and of "
+                "the joints, and begin again",
+            )
+        pose, joints = found
+        goal = Goal(situation.label("station"), pose, tuple(joints.tolist()), self._wish.speed_rad_s)
+        return Step(goal, "start", {}, None, believed=situation.believed)
+
+    def _planned(self, situation: RigSituation, believed: RigEstimate) -> Step | Halt:
+        random = self._random(situation)
+        known = np.array([situation.joints(station) for station in situation.stations])
+        around = known[random.integers(0, len(known), self._candidates)]
+        spread = random.uniform(*SPREADS_RAD, (len(around), 1))
+        joints = around + spread * random.standard_normal(around.shape)
+        body = body_of(self._arm, self._workspace, self._solids, believed)
+        joints = joints[[self._arm.within_limits(q) for q in joints]]
+        joints = joints[np.array([why is None for why in body.obstacles(joints)], dtype=bool)]
+        poses = self._arm.forward(joints)
+        pool = Pool(
+            tuple(
+                Candidate(f"candidate_{k}", Pose(pose), tuple(q))
+                for k, (pose, q) in enumerate(zip(poses, joints.tolist(), strict=True))
+            )
+        )
+        missing = {} if self._request is None else self._request.missing(believed)
+        found = rig_gains(believed, pool, missing, self._sight, self._limits)
+        reached = self._reached(situation, joints, -np.nan_to_num(found.gains, nan=-np.inf))
+        reached = [i for i in reached if np.isfinite(found.gains[i])]
+        if not reached:
+            return Halt(EndReason.NO_CANDIDATE, "no posture left from which a camera should see a target")
+        # After a failure the next best: the same place would most likely fail alike.
+        best = reached[min(len(situation.counted), len(reached) - 1)]
+        decision = {
+            "predicted_gain": float(found.gains[best]),
+            "expected": [{"camera": camera, "target": target} for camera, target in found.seen[best]],
+            "missing": {" ".join(names): factor for names, factor in missing.items()},
+            "reach_before": {
+                name: believed.of_camera(name).within_95.to_dict()
+                for name in believed.fit.measurements.cameras
+            },
+        }
+        return self._step(situation, joints[best], "plan", decision)
+
+    def _reached(self, situation: RigSituation, joints: FloatArray, order: FloatArray) -> list[int]:
+        """Return the first in order of these postures (N, n) to which the way is free."""
+        body = body_of(self._arm, self._workspace, self._solids, situation.believed)
+        standing = situation.standing(self._start)
+        ranked = np.argsort(order, kind="stable")[:MOST_PATHS]
+        if standing is None:  # a person moves it, and sees the way
+            return [int(i) for i in ranked]
+        return [int(i) for i in ranked if body.obstacle_on_path(standing, joints[i]) is None]
+
+    def _step(
+        self, situation: RigSituation, joints: FloatArray, phase: str, decision: dict[str, Any]
+    ) -> Step:
+        pose, speed = Pose(self._arm.forward(joints)), self._wish.speed_rad_s
+        goal = Goal(situation.label("station"), pose, tuple(joints.tolist()), speed)
+        return Step(goal, phase, decision, None, believed=situation.believed)
+
+
+def request_of(wish: Wish) -> RigRequest | None:
+    """Return the accuracy that is asked for of all cameras; None to take all stations."""
+    if wish.accuracy_mm is None or wish.accuracy_deg is None:
+        return None
+    return RigRequest(wish.accuracy_mm, wish.accuracy_deg, camera_to_camera=wish.camera_to_camera)
+
+
+def _worst(believed: RigEstimate) -> tuple[float, float]:
+    """Return the largest radii of all cameras, millimetres and degrees."""
+    radii = [believed.of_camera(name).within_95 for name in believed.fit.measurements.cameras]
+    return max(r.translation_mm for r in radii), max(r.rotation_deg for r in radii)
