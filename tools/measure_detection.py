@@ -4,6 +4,8 @@
     python tools/measure_detection.py rendered --first 0 --count 200 --rows rows.csv
     python tools/measure_detection.py summary --rows rows.csv
     python tools/measure_detection.py quality --views 8
+    python tools/measure_detection.py none
+    python tools/measure_detection.py large
     HANDEYE_DATA=... python tools/measure_detection.py public
 
 Times are of one processor; those of `speed` are the least of several, the others medians over the views.
@@ -24,7 +26,7 @@ from handeye.datasets import ImageSet, load
 from handeye.datasets.images import read_image
 from handeye.detection import Detection, NotFound, Prediction, calibrate_camera, detect, relabeled
 from handeye.detection.registration import printed
-from handeye.types import AprilGrid, Camera, Charuco, Chessboard, CircleGrid, Pose, Target
+from handeye.types import AprilGrid, ArucoGrid, Camera, Charuco, Chessboard, CircleGrid, Pose, Target
 
 WIDTH, HEIGHT = 1280, 1024
 CAMERA = Camera("brown_conrady_5", [1400, 1396, 645, 508, -0.12, 0.08, 5e-4, -4e-4, 0.0], WIDTH, HEIGHT)
@@ -127,6 +129,52 @@ def speed(views: int) -> None:
             )
 
 
+def boardless() -> dict[str, np.ndarray]:
+    """Pictures of 2.3 MP without a board: clutter, noise, and a wall lit from one side."""
+    width, height = 1920, 1200
+    random = np.random.default_rng(77)
+    pictures = {f"clutter {k}": clutter(width, height, random).astype(float) for k in range(3)}
+    pictures |= {"grey": np.full((height, width), 120.0)}
+    pictures |= {"wall": np.broadcast_to(np.linspace(60, 180, width), (height, width))}
+    looks = {name: (picture, 2.0) for name, picture in pictures.items()}
+    looks |= {f"{name}, noise of 12": (pictures[name], 12.0) for name in ("clutter 0", "grey")}
+    return {
+        name: np.rint(
+            (cv2.GaussianBlur(picture, (0, 0), 0.8) + random.normal(scale=noise, size=picture.shape)).clip(
+                0, 255
+            )
+        ).astype(np.uint8)
+        for name, (picture, noise) in looks.items()
+    }
+
+
+def without_board() -> None:
+    """Print the processor time that pictures without a board cost, for each family."""
+    print("| picture | " + " | ".join(TARGETS) + " |\n|---" + "|---" * len(TARGETS) + "|")
+    for name, image in boardless().items():
+        cells = [f"{timed(image, target, None):.0f} ms" for target in TARGETS.values()]
+        print(f"| {name} | {' | '.join(cells)} |", flush=True)
+
+
+def large() -> None:
+    """Print the processor time of pictures of 20 MP, with a board and without, beside OpenCV."""
+    for name, target in TARGETS.items():
+        look = Appearance(blur_px=0.6, noise=2.0)
+        random = np.random.default_rng(7)
+        small = BoardRenderer(CAMERA, target, look).image(posed(target, 0.4, random), random)
+        image = cv2.resize(small, (5472, 3648), interpolation=cv2.INTER_CUBIC)
+        empty = cv2.resize(boardless()["clutter 0"], (5472, 3648), interpolation=cv2.INTER_CUBIC)
+        found = detect(image, target)
+        points = 0 if isinstance(found, NotFound) else len(found)
+        line = f"{name}: {points} points, {timed(image, target, None, 1):.0f} ms; "
+        line += f"without a board {timed(empty, target, None, 1):.0f} ms"
+        if isinstance(target, Chessboard):
+            began = time.process_time()
+            cv2.findChessboardCornersSB(image, (target.columns, target.rows))
+            line += f"; OpenCV {1e3 * (time.process_time() - began):.0f} ms"
+        print(line, flush=True)
+
+
 # Looks under which stated deviations are compared with errors.
 LOOKS: dict[str, dict[str, float]] = {
     "sharp": {"blur_px": 0.4, "noise": 1.0},
@@ -138,17 +186,18 @@ LOOKS: dict[str, dict[str, float]] = {
 }
 
 
-def quality(views: int) -> None:
+def quality(first: int, views: int) -> None:
     """Print squared errors over stated variances, for each family and look, and median deviations."""
     print("| target | " + " | ".join(LOOKS) + " | all |\n|---" + "|---" * (len(LOOKS) + 1) + "|")
-    for name, target in TARGETS.items():
-        renderer = BoardRenderer(CAMERA, target, Appearance())
+    for name, target in (TARGETS | {"ArUco grid": ArucoGrid(5, 7, 0.03, 0.006, "DICT_5X5_100")}).items():
+        # Finely, as edges along the rows of pixels are otherwise drawn up to a sixteenth of a pixel off.
+        renderer = BoardRenderer(CAMERA, target, Appearance(supersampling=16))
         cells: list[str] = []
         everything: list[float] = []
         for look in LOOKS.values():
             ratios: list[float] = []
             sigmas: list[float] = []
-            for view in range(views):
+            for view in range(first, first + views):
                 random = np.random.default_rng([23, view])
                 pose = posed(target, float(random.uniform(0.25, 0.7)), random)
                 found = detect(taken(renderer.image(pose), look, random), target)
@@ -293,8 +342,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("speed", "rendered", "summary", "quality", "public"))
-    parser.add_argument("--first", type=int, default=0, help="number of the first rendered view")
+    parser.add_argument(
+        "what", choices=("speed", "none", "large", "rendered", "summary", "quality", "public")
+    )
+    parser.add_argument("--first", type=int, default=0, help="number of the first view")
     parser.add_argument("--count", type=int, default=1000, help="number of rendered views")
     parser.add_argument(
         "--rows", type=Path, help="file that rows of rendered views are added to or read from"
@@ -304,12 +355,16 @@ def main() -> None:
     cv2.setNumThreads(1)
     if options.what == "speed":
         speed(options.views)
+    elif options.what == "none":
+        without_board()
+    elif options.what == "large":
+        large()
     elif options.what == "rendered":
         rendered(options.first, options.count, options.rows)
     elif options.what == "summary":
         summary(options.rows)
     elif options.what == "quality":
-        quality(options.views)
+        quality(options.first, options.views)
     else:
         public(Path(os.environ["HANDEYE_DATA"]))
 

@@ -1,6 +1,7 @@
 """`handeye detect`: what is seen in each picture, and why the target is not found in some."""
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -29,6 +30,7 @@ from handeye.detection import (
     shown_board,
     without_lengths,
 )
+from handeye.detection.batch import processors
 from handeye.errors import DetectionError, HandeyeError, InputError
 from handeye.types import Chessboard, Target
 from handeye.types.arrays import FloatArray
@@ -143,12 +145,16 @@ def _looked_for(pictures: list[Path], target: Target) -> list[_Seen]:
 
 
 def _searched(pictures: list[Path]) -> list[_Seen]:
-    """Return which board is in each picture."""
+    """Return which board is in each picture, looked at side by side."""
     seen: list[_Seen] = []
+    pool = ThreadPoolExecutor(processors(), thread_name_prefix="detect")
     with progress("Looking for any board in the pictures") as advance:
-        for path in pictures:
-            advance(len(seen), len(pictures))
-            seen.append(_any_board(path))
+        try:
+            for one in pool.map(_any_board, pictures):
+                seen.append(one)
+                advance(len(seen), len(pictures))
+        finally:
+            pool.shutdown(cancel_futures=True)
     return seen
 
 

@@ -30,6 +30,7 @@ def report(
     output: Path = Path("report.html"),
     model: ModelName | None = None,
     reduced: bool = False,
+    pictures: bool = False,
     source: Source = Source(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
@@ -49,6 +50,8 @@ def report(
         For a folder: auto (the data say how noisy robot and camera are) or paper (both are exact).
     reduced
         For a folder: answer even where the views leave directions open.
+    pictures
+        For a folder: show the camera's pictures, too, with what was found drawn over them.
     """
     check_output(output)
     if output.suffix.lower() not in {".html", ".htm"}:
@@ -56,8 +59,10 @@ def report(
     from handeye.report import html_page, to_dict  # noqa: PLC0415 - other commands need no pictures
 
     if source.only is None and result.is_dir() and is_rig(result):
+        if pictures:
+            raise UsageError("pictures are shown of one camera", hint="give --only with --pictures")
         return _of_rig(result, output, model, source, reduced=reduced)
-    gathered = _gathered(result, output, model, source, reduced=reduced)
+    gathered = _gathered(result, output, model, source, reduced=reduced, is_drawn=pictures)
     page = html_page(gathered).encode()
     replace_file(output, page)
     return Answer(
@@ -91,14 +96,14 @@ def _of_rig(folder: Path, output: Path, model: ModelName | None, source: Source,
 
 
 def _gathered(
-    result: Path, output: Path, model: ModelName | None, source: Source, *, reduced: bool
+    result: Path, output: Path, model: ModelName | None, source: Source, *, reduced: bool, is_drawn: bool
 ) -> "Gathered":
     from handeye.report import gather_recording, gather_result  # noqa: PLC0415
 
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     words = ["handeye", "report", str(result)]
     if result.suffix.lower() == ".json" and not result.is_dir():
-        if source != Source() or model is not None or reduced:
+        if source != Source() or model is not None or reduced or is_drawn:
             raise UsageError(
                 "a result is solved already", hint="leave the options for folders away, or give the folder"
             )
@@ -108,9 +113,16 @@ def _gathered(
         words += ["--model", model.value]
     if reduced:
         words.append("--reduced")
+    if is_drawn:
+        words.append("--pictures")
     command = shlex.join([*words, "--output", str(output)])
     return gather_recording(
-        source.open(result), model or ModelName.AUTO, command=command, reduced=reduced, made=made
+        source.open(result),
+        model or ModelName.AUTO,
+        command=command,
+        reduced=reduced,
+        made=made,
+        is_drawn=is_drawn,
     )
 
 

@@ -103,7 +103,7 @@ def detect_all(
         Threads, at least one; by default one for each processor.
     """
     memory = DetectionCache() if cache is None else cache
-    count = max(1, workers or _processors())
+    count = max(1, workers or processors())
     found: dict[str, Detection] = {}
     failed: dict[str, HandeyeError] = {}
     waiting: deque[tuple[str, Future[Detection | HandeyeError]]] = deque()
@@ -129,7 +129,7 @@ def detect_all(
     return Batch(found, failed)
 
 
-def _processors() -> int:
+def processors() -> int:
     """Return how many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handeye.detection.base import Image
+from handeye.detection.noise import calmed
 from handeye.types.arrays import FloatArray, IndexArray
 
 LEVELS = 12
-# Grey values that an image must span, and outlines looked at: noise has very many.
-LEAST_RANGE, MOST_OUTLINES = 8.0, 6000
+# Grey values that an image must span, those of strong noise, and outlines looked at: noise has very many.
+LEAST_RANGE, LEAST_OF_NOISE, MOST_OUTLINES = 8.0, 16.0, 6000
 SMALLEST_AREA_PX = 12.0
 FEWEST_EDGE_PX = 8
 # Largest share of the image that one circle may cover.
@@ -68,10 +69,11 @@ def find_spots(image: Image) -> tuple[Spots, Spots]:
     The image is cut at several grey levels, so that light may change across it; a spot shows at
     several levels.
     """
-    smooth = cv2.GaussianBlur(image, (3, 3), 0)
+    calm = calmed(image)
+    smooth = cv2.GaussianBlur(calm, (3, 3), 0)
     low, high = (float(v) for v in np.percentile(smooth[::4, ::4], [1, 99]))
     rows: list[tuple[float, ...]] = []
-    if high - low < LEAST_RANGE:
+    if high - low < (LEAST_RANGE if calm is image else LEAST_OF_NOISE):
         return _merged(np.zeros((0, 6))), _merged(np.zeros((0, 6)))
     for level in np.linspace(low, high, LEVELS + 2)[1:-1]:
         binary = cv2.threshold(smooth, level, 255, cv2.THRESH_BINARY)[1]

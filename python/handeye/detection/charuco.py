@@ -37,6 +37,7 @@ from handeye.detection.markers import (
     from_neighbours,
     parameters,
 )
+from handeye.detection.noise import calmed
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import Charuco
 from handeye.types.arrays import FloatArray
@@ -94,7 +95,7 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
     detector = cv2.aruco.CharucoDetector(
         _board(target), cv2.aruco.CharucoParameters(), parameters(target.border_bits)
     )
-    found, found_ids, marker_corners, marker_ids = detector.detectBoard(image)
+    found, found_ids, marker_corners, marker_ids = detector.detectBoard(calmed(image))
     seen_markers = Seen.of(marker_ids, marker_corners)
     of_board = seen_markers.of_board(target)
     if isinstance(of_board, NotFound):

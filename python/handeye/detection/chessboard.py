@@ -22,8 +22,9 @@ from handeye.detection.saddles import find_saddles
 from handeye.types import Chessboard
 from handeye.types.arrays import FloatArray
 
-# The search begins in a picture of about this size and goes on in ones twice as large, up to the image.
-COARSEST_SIDE_PX, SMALLEST_SIDE_PX = 500, 24
+# The search begins in a picture of about this size and goes on in ones twice as large, up to the image or the
+# largest one in which squares are looked for.
+COARSEST_SIDE_PX, LARGEST_SIDE_PX, SMALLEST_SIDE_PX = 500, 2800, 24
 # A third of a board's corners, or so many, must be joined before it is grown; of a board of any size so many.
 LARGE_CORE, FEWEST_CORE = 12, 6
 # Part of a square's height that the window of a corner may take.
@@ -64,10 +65,13 @@ def find(image: Image, target: Chessboard) -> Detection | NotFound:
 
 
 def _parts(image: Image) -> Iterator[Part]:
-    """Return the image at sizes from coarse to its own."""
+    """Return the image at sizes from coarse to fine."""
+    largest = Part.halved(image, LARGEST_SIDE_PX).picture
     halvings = max(0, round(np.log2(max(image.shape) / COARSEST_SIDE_PX)))
     for power in range(halvings, -1, -1):
         part = Part.whole(image, 0.5**power)
+        if max(part.picture.shape) > max(largest.shape):
+            return
         if min(part.picture.shape) >= SMALLEST_SIDE_PX:
             yield part
 

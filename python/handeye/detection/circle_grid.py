@@ -14,6 +14,7 @@ from handeye.detection.blobs import Spots, areas, find_spots
 from handeye.detection.centroid import area_centroids, gaps, sigmas_px
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.lattice import Placement, grow, placements
+from handeye.detection.markers import from_neighbours
 from handeye.detection.part import Part
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import CircleGrid
@@ -32,6 +33,9 @@ LEAST_LINE_SHARE = 0.6
 SMALL_PX, FEWEST_TOGETHER = 8.0, 8
 # How much larger a marked circle of unknown size is guessed to be.
 LARGER = 1.5
+# A circle may be off from where those around it put it by this much, or this share of the way to the next;
+# one that something covers in part is off by more. Of the circles so many must be measured well.
+OFF_PX, OFF_SHARE, LEAST_MEASURED = 0.6, 0.02, 0.6
 # A circle further from where it was expected, as a share of the root of its area, or of another size, is
 # something else.
 ASTRAY_SHARE, AREA_RATIO = 0.3, 1.5
@@ -74,6 +78,7 @@ def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | Non
     there[ids] = good
     if not _is_certain(target, there):
         return None
+    good[good] = _fit_others(target.points[ids[good], :2], found.centres[good])
     if target.marked is not None:
         spots = np.full(target.point_count, -1)
         spots[ids[good]] = np.flatnonzero(good)
@@ -81,6 +86,14 @@ def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | Non
             return None
     kept = found.take(np.flatnonzero(good))
     return ordered(target, ids[good], kept.centres, sigmas_px(image, kept))
+
+
+def _fit_others(plane: FloatArray, pixels: FloatArray) -> NDArray[np.bool_]:
+    """Tell which circles (N,), at (N, 2) on the board and in the image, lie where those around put them."""
+    away = np.linalg.norm(pixels[:, np.newaxis] - pixels, axis=2)
+    np.fill_diagonal(away, np.inf)
+    off = np.linalg.norm(from_neighbours(plane, pixels) - pixels, axis=1)
+    return np.asarray(off <= np.maximum(OFF_PX, OFF_SHARE * away.min(axis=1)), dtype=np.bool_)
 
 
 def _measure_first(image: Image, expected: Spots, which: int) -> None:
@@ -199,6 +212,9 @@ def _measured(
                 Reason.INCONSISTENT, "no circle where the marked one may be is larger than the others"
             )
     ids = np.flatnonzero((chosen >= 0) & good[chosen])
+    ids = ids[_fit_others(target.points[ids, :2], pixels[chosen[ids]])]
+    if len(ids) < LEAST_MEASURED * target.point_count:
+        return NotFound(Reason.INCOMPLETE, f"only {len(ids)} of {target.point_count} circles can be measured")
     kept = Spots(pixels[chosen[ids]], shapes[chosen[ids]])
     return ordered(target, ids, kept.centres, sigmas_px(image, kept))
 

@@ -1,6 +1,7 @@
 """Which board a picture shows, where the one described is not there."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,9 +19,9 @@ from handeye.types.arrays import IndexArray
 from handeye.types.target import Coded, MarkerCorners
 
 _Board = TypeVar("_Board", bound=Target)
-# A board without markers is looked for in a picture no larger than this; circles, of which noise makes many,
-# in a smaller one.
-SEARCH_SIDE_PX, CIRCLES_SIDE_PX = 1000, 600
+# Boards are looked for in a picture no larger than this; circles, of which noise makes many, in a
+# smaller one.
+SEARCH_SIDE_PX, CIRCLES_SIDE_PX = 1400, 600
 # Fewer markers are chance where none are expected.
 FEWEST_MARKERS = 4
 # Share of the circles of a grid that must be there, the fewest that are a grid, and the most.
@@ -52,11 +53,7 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
         return missing
     # Where there are markers of the board, it is another with such markers, or none.
     only_markers = isinstance(target, Coded) and missing.reason is not Reason.NO_PATTERN
-    # Where no markers are described, whatever there is need only be told, not measured.
-    small = (
-        image if isinstance(target, Coded) else Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
-    )
-    shown, markers = next(_visible(small, target, only_markers=only_markers), (None, None))
+    shown, markers = next(_visible(image, target, only_markers=only_markers), (None, None))
     if shown is None:
         return missing
     if shown != target:
@@ -71,17 +68,31 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
 
 def shown_board(image: Image) -> Target | None:
     """Return the board that an image shows, of lengths that are not known; None if it shows none."""
-    return next((board for board, _ in _visible(image, UNKNOWN, fewest_markers=1)), None)
+    # Small markers only show in the whole picture.
+    for side_px in (SEARCH_SIDE_PX, max(image.shape)):
+        for board, _ in _visible(image, UNKNOWN, fewest_markers=1, side_px=side_px):
+            return board
+        if max(image.shape) <= SEARCH_SIDE_PX:
+            break
+    return None
 
 
 def _visible(
-    image: Image, target: Target, fewest_markers: int = FEWEST_MARKERS, *, only_markers: bool = False
+    image: Image,
+    target: Target,
+    fewest_markers: int = FEWEST_MARKERS,
+    *,
+    only_markers: bool = False,
+    side_px: float = SEARCH_SIDE_PX,
 ) -> Iterator[tuple[Target, Reading | None]]:
     """Yield boards that an image shows, those of the family described first, and their markers."""
+    part = Part.halved(image, side_px)
+    small = part.picture
     # Markers first: what lies between them looks like squares, too.
     touched = isinstance(target, Coded) and target.border_bits == 2
-    reading = read_markers(image, touched=touched)
+    reading = read_markers(small, touched=touched)
     if reading is not None:
+        reading = replace(reading, corners=part.places(reading.corners))
         fewest = 1 if isinstance(target, Coded) else fewest_markers
         yield from ((board, reading) for board in _marked(image, target, reading, fewest))
         if len(reading.ids) >= FEWEST_MARKERS:
@@ -90,7 +101,7 @@ def _visible(
         return
     without_markers = (_chessboard, _circle_grid)
     for look in without_markers[::-1] if isinstance(target, CircleGrid) else without_markers:
-        for board in look(image, target):
+        for board in look(small, target):
             yield board, None
 
 
@@ -102,17 +113,16 @@ def _marked(image: Image, target: Target, reading: Reading, fewest: int) -> Iter
             yield from boards_like(target, lattice, (width, height))
 
 
-def _chessboard(image: Image, target: Target) -> Iterator[Chessboard]:
+def _chessboard(picture: Image, target: Target) -> Iterator[Chessboard]:
     """Yield the chessboard of whatever size, turned as it is described."""
     pitch = target.spacing_m
-    small = Part.whole(image, SEARCH_SIDE_PX / max(image.shape)).picture
-    for rows, columns in chessboard.sizes(small):
+    for rows, columns in chessboard.sizes(picture):
         yield _nearest(target, [Chessboard(rows, columns, pitch), Chessboard(columns, rows, pitch)])
 
 
-def _circle_grid(image: Image, target: Target) -> Iterator[Target]:
+def _circle_grid(picture: Image, target: Target) -> Iterator[Target]:
     """Yield the grid of circles of whatever size, turned as it is described."""
-    small = Part.whole(image, CIRCLES_SIDE_PX / max(image.shape)).picture
+    small = Part.whole(picture, CIRCLES_SIDE_PX / max(picture.shape)).picture
     for spots in find_spots(small):
         lattice = grow(spots, MOST_CIRCLES)
         if len(lattice) >= FEWEST_CIRCLES:
@@ -120,7 +130,7 @@ def _circle_grid(image: Image, target: Target) -> Iterator[Target]:
             if grids:
                 # The dark squares of a chessboard lie like the circles of such a grid.
                 if all(grid.asymmetric for grid in grids):
-                    yield from (b for b in _chessboard(image, target) if b.point_count > len(lattice))
+                    yield from (b for b in _chessboard(picture, target) if b.point_count > len(lattice))
                 yield _nearest(target, grids)
                 return
 

@@ -10,6 +10,7 @@ import numpy as np
 from handeye.detection import charuco, chessboard, circle_grid, tags
 from handeye.detection.base import Detection, Image, NotFound, Reason, upright
 from handeye.detection.description import explained
+from handeye.detection.plausible import implausible
 from handeye.detection.predicted import Prediction, where_expected
 from handeye.detection.quality import scaled
 from handeye.detection.registration import Aligned
@@ -19,7 +20,7 @@ from handeye.types.target import MarkerCorners
 
 SMALLEST_SIDE_PX = 24
 # To be raised with every change of what is detected, or where.
-VERSION = 6
+VERSION = 7
 
 
 @dataclass(frozen=True)
@@ -88,13 +89,13 @@ def detect(image: Image, target: Target, *, predicted: Prediction | None = None)
     whole, positive = upright(np.ascontiguousarray(image), target)
     if predicted is not None:
         found = _where_predicted(whole, positive, kind, predicted)
-        if found is not None:
+        if found is not None and implausible(target, found) is None:
             return scaled(target, found)
     try:
         found = kind.find(whole, positive)
         if isinstance(found, NotFound):
             found = explained(image, target, found)
-        return scaled(target, found) if isinstance(found, Detection) else found
+        return found if isinstance(found, NotFound) else implausible(target, found) or scaled(target, found)
     except cv2.error as error:
         # OpenCV asserts on some contents; to the caller that is one image without a target, not a crash.
         return NotFound(Reason.DETECTOR_FAILED, f"OpenCV: {str(error).strip()[:200]}")

@@ -15,6 +15,13 @@ from handeye.types.arrays import FloatArray
 FEWEST = 16
 # A shift must be so many times its deviation; a larger one means a board that is not as described.
 LEAST_IN_SIGMAS, LARGEST_PX = 3.0, 1.5
+# How far edges usually lie elsewhere where too few corners tell: cameras without gamma and with one together.
+USUAL_PX = 0.17
+
+
+def unknown_shift_px(count: int) -> float:
+    """Return the deviation of so many corners that stays because nothing tells where edges have moved to."""
+    return USUAL_PX if count < FEWEST else 0.0
 
 
 def without_edge_shift(plane: FloatArray, pixels: FloatArray, sides: FloatArray) -> FloatArray:

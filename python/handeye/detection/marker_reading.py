@@ -6,9 +6,11 @@ from itertools import repeat
 
 import cv2
 import numpy as np
+from cv2.typing import MatLike
 
 from handeye.detection.base import Image
 from handeye.detection.markers import SMALLEST_PERIMETER_SHARE, dictionary
+from handeye.detection.noise import calmed
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.target.dictionaries import marker_bits
 
@@ -33,11 +35,13 @@ NEAR_PX, NEAR_SHARE = 5, 0.08
 _ENOUGH = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 20, 0.05)
 # Windows of the thresholds, what is darker than its surroundings by so much, and how straight sides are, as a
 # share of the length around.
-WINDOWS_PX, THRESHOLD, STRAIGHT = (3, 13, 23), 7, 0.03
+WINDOWS_PX, THRESHOLD, STRAIGHT = (5, 13, 23), 7, 0.03
+# Enough of them where ink is made thinner.
+FEW_WINDOWS_PX = (13, 23)
 # What is seen at several thresholds is one.
 SAME_PX, SAME_SIZES, MOST_QUADS = 4.0, 8, 1500
 # Thinner ink, dark or light, parts markers from squares that touch them, as Kalibr prints them.
-THINNED = ((cv2.dilate, 1), (cv2.dilate, 3), (cv2.erode, 3), (cv2.dilate, 5), (cv2.erode, 5))
+THINNED = ((cv2.dilate, 1), (cv2.dilate, 3), (cv2.erode, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,18 +78,21 @@ def read_markers(image: Image, *, touched: bool = False) -> Reading | None:
     touched
         Whether squares that touch the markers are to be reckoned with where none is read otherwise.
     """
+    picture = calmed(image)
     readings = dict[tuple[str, int, bool], Reading]()
     best: Reading | None = None
     for change, size in THINNED:
         kernel = np.ones((size, size), dtype=np.uint8)
-        changed = image if size == 1 else np.asarray(change(image, kernel), dtype=np.uint8)
-        for reading in _readings(changed):
+        changed = picture if size == 1 else np.asarray(change(picture, kernel), dtype=np.uint8)
+        for reading in _readings(changed, WINDOWS_PX if size == 1 else FEW_WINDOWS_PX):
             kind = reading.dictionary, reading.border_bits, reading.inverted
             readings[kind] = _together(readings[kind], reading) if kind in readings else reading
         best = max(map(_outermost, readings.values(), repeat(readings)), key=_weight, default=None)
         if not (touched if best is None else best.border_bits == 2):
             break
-    return None if best is None else replace(best, corners=_sharpened(image, best.corners))
+    if best is None:
+        return None
+    return replace(best, corners=_sharpened(image, best.corners))
 
 
 def _weight(reading: Reading) -> int:
@@ -133,14 +140,16 @@ def _sharpened(image: Image, corners: FloatArray) -> FloatArray:
     return sharp
 
 
-def _readings(image: Image) -> Iterator[Reading]:
-    quads = _quads(image)
+def _readings(image: Image, windows_px: tuple[int, ...]) -> Iterator[Reading]:
+    quads = _quads(image, windows_px)
     large = LARGE_SHARE * max(image.shape)
     if not len(quads):
         return
+    unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
+    maps = [cv2.getPerspectiveTransform(unit, quad) for quad in quads.astype(np.float32)]
     for border in (1, 2):
         for bits in (4, 5, 6, 7):
-            cells = _cells(image, quads, bits + 2 * border)
+            cells = _cells(image, maps, bits + 2 * border)
             low, high = cells.min(axis=(1, 2)), cells.max(axis=(1, 2))
             light = cells > ((low + high) / 2)[:, np.newaxis, np.newaxis]
             framed = light.copy()
@@ -184,7 +193,7 @@ def _identified(
     return np.array(list(found), dtype=np.int64), corners, np.array(sorted(repeated), dtype=np.int64)
 
 
-def _quads(image: Image) -> FloatArray:
+def _quads(image: Image, windows_px: tuple[int, ...]) -> FloatArray:
     """Return the corners (Q, 4, 2), clockwise, of everything that has four.
 
     As OpenCV looks for candidates, but one that lies around another is kept: the outline of the paper must
@@ -192,7 +201,7 @@ def _quads(image: Image) -> FloatArray:
     """
     least = SMALLEST_PERIMETER_SHARE * max(image.shape)
     found: dict[tuple[int, ...], FloatArray] = {}
-    for window in (*WINDOWS_PX, max(image.shape) // 16 | 1):
+    for window in (*windows_px, max(image.shape) // 16 | 1):
         dark = cv2.adaptiveThreshold(
             image, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, THRESHOLD
         )
@@ -211,18 +220,14 @@ def _quads(image: Image) -> FloatArray:
     return np.array(list(found.values())[:MOST_QUADS]).reshape(-1, 4, 2)
 
 
-def _cells(image: Image, quads: FloatArray, side: int) -> FloatArray:
-    """Return the mean grey values (Q, side, side) of the cells of quads (Q, 4, 2)."""
+def _cells(image: Image, homographies: list[MatLike], side: int) -> FloatArray:
+    """Return the mean grey values (Q, side, side) of the cells of quads, which are images of unit squares."""
     fine = (np.arange(SAMPLES) - (SAMPLES - 1) / 2) / SAMPLES * SHARE
     steps = ((np.arange(side)[:, np.newaxis] + 0.5 + fine) / side).ravel()
     x, y = np.meshgrid(steps, steps)
-    unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
     flat = np.stack([x, y], axis=-1).reshape(1, -1, 2).astype(np.float32)
-    places = [
-        cv2.perspectiveTransform(flat, cv2.getPerspectiveTransform(unit, quad.astype(np.float32)))
-        for quad in quads
-    ]
-    maps = np.array(places, dtype=np.float32).reshape(len(quads), -1, 2)
+    places = [cv2.perspectiveTransform(flat, homography) for homography in homographies]
+    maps = np.array(places, dtype=np.float32).reshape(len(places), -1, 2)
     grey = cv2.remap(image, maps, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    shape = (len(quads), side, SAMPLES, side, SAMPLES)
+    shape = (len(places), side, SAMPLES, side, SAMPLES)
     return np.asarray(grey, dtype=np.float64).reshape(shape).mean(axis=(2, 4))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from handeye.detection.base import Image, NotFound, Reason
 from handeye.detection.beyond import correlation
+from handeye.detection.noise import calmed
 from handeye.detection.registration import Aligned, drawn
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.target import Coded
@@ -99,7 +100,7 @@ class Seen:
 def find_markers(image: Image, name: str, border_bits: int) -> Seen:
     """Return the markers of a dictionary."""
     detector = cv2.aruco.ArucoDetector(dictionary(name), parameters(border_bits))
-    corners, ids, _ = detector.detectMarkers(image)
+    corners, ids, _ = detector.detectMarkers(calmed(image))
     return Seen.of(ids, corners)
 
 

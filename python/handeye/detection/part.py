@@ -31,6 +31,12 @@ class Part:
         shift = 0.5 * factors - 0.5
         return cls(small, np.array([[factors[0], 0, shift[0]], [0, factors[1], shift[1]], [0, 0, 1]]))
 
+    @classmethod
+    def halved(cls, image: Image, side_px: float) -> "Part":
+        """Return all of an image, at half the size until its longer side has at most so many pixels."""
+        halvings = max(0, int(np.ceil(np.log2(max(image.shape) / side_px))))
+        return cls.whole(image, 0.5**halvings)
+
     def places(self, pixels: FloatArray) -> FloatArray:
         """Return places (..., 2) of the picture in pixels of the image."""
         return mapped(self.to_image, pixels)

@@ -18,9 +18,11 @@ OF_HOMOGRAPHY, DEGREES, POINTS_PER_TERM = 8, (6, 5, 4, 3), 1.9
 USUAL_COUNT = 2.0
 # No point is better.
 LEAST_PX = 0.001
-# The largest of the squares are left out, as a few points may lie elsewhere (a larger circle does); the mean
-# of the others of a Gaussian is this share of its variance.
-TRIMMED, OF_VARIANCE = 0.1, 0.623
+# The largest of the squares are left out, as a few points may lie elsewhere; the mean of the others of a
+# Gaussian is this share of its variance.
+TRIMMED, OF_VARIANCE = 0.03, 0.831
+# Squared distances over variances of both coordinates that one point in ten thousand exceeds.
+ASTRAY = 18.4
 
 
 def off_plane(plane: FloatArray, pixels: FloatArray) -> tuple[FloatArray, int] | None:
@@ -51,13 +53,20 @@ def scaled(target: Target, detection: Detection) -> Detection:
     """
     if detection.sigmas_px is None:
         return detection
+    # A larger circle lies elsewhere in perspective than its neighbours say, which is no error of it.
+    radii = target.radii_m[detection.point_ids]
+    told = radii == np.median(radii)
     relative = detection.sigmas_px
-    off = off_plane(target.points[detection.point_ids, :2], detection.pixels)
-    squares, freedom = 0.0, 0
+    off = off_plane(target.points[detection.point_ids[told], :2], detection.pixels[told])
+    variances = relative**2
     if off is not None and off[1] > 0:
         residuals, freedom = off
-        sorted_squares = np.sort(((residuals / relative[:, np.newaxis]) ** 2).ravel())
+        sorted_squares = np.sort(((residuals / relative[told, np.newaxis]) ** 2).ravel())
         kept = sorted_squares[: round((1 - TRIMMED) * len(sorted_squares))]
-        squares = float(kept.mean()) / OF_VARIANCE * residuals.size
-    factor = (squares + USUAL_COUNT) / (freedom + USUAL_COUNT)
-    return detection.with_sigmas(np.maximum(np.sqrt(factor) * relative, LEAST_PX))
+        variance = float(kept.mean()) / OF_VARIANCE * residuals.size / freedom
+        # What is usual may be wrong by a power of ten, up or down, so it is logarithms that are weighed.
+        variances *= variance ** (freedom / (freedom + USUAL_COUNT))
+        # A point that lies further off than chance brings it was measured worse than its picture tells.
+        squares = (residuals**2).sum(axis=1)
+        variances[told] = np.where(squares > ASTRAY * variances[told], squares / 2, variances[told])
+    return detection.with_sigmas(np.maximum(np.sqrt(variances), LEAST_PX))

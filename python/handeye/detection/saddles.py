@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handeye.detection.base import Image
+from handeye.detection.noise import pixel_noise
 from handeye.types.arrays import FloatArray, IndexArray
 
 # Rings around a candidate, in pixels: the smaller one for small squares, the larger one for blurred pictures.
@@ -63,7 +64,7 @@ def find_saddles(picture: Image) -> Saddles:
         fits = np.isfinite(contrast)
         angles = np.where(fits[:, np.newaxis], other, angles)
         contrasts = np.where(fits, contrast, contrasts)
-    least = max(LEAST_CONTRAST, LEAST_IN_NOISE * _noise(picture, smooth))
+    least = max(LEAST_CONTRAST, LEAST_IN_NOISE * pixel_noise(picture))
     good = np.flatnonzero(contrasts >= least)
     good = good[np.argsort(-contrasts[good], kind="stable")[:MOST_KEPT]]
     return Saddles(places[good], angles[good], contrasts[good])
@@ -76,18 +77,6 @@ def sampled(picture: Image, places: FloatArray) -> FloatArray:
     maps = places.astype(np.float32)
     values = cv2.remap(picture, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(values, dtype=np.float64).reshape(places.shape[:2])
-
-
-def _noise(picture: Image, smooth: Image) -> float:
-    """Return the deviation of a pixel's noise, as the median of what smoothing takes away tells."""
-    off = np.asarray(cv2.absdiff(picture, smooth))[::2, ::2]
-    # The median of whole numbers, between them as they are spread; of a Gaussian it is 0.67 deviations, and
-    # smoothing leaves 0.78 of the noise behind.
-    shares = np.cumsum(np.bincount(off.ravel(), minlength=256)) / off.size
-    at = int(np.searchsorted(shares, 0.5))
-    before = shares[at - 1] if at else 0.0
-    median = at - 0.5 + (0.5 - before) / (shares[at] - before)
-    return max(0.0, float(median)) / (0.67 * 0.78)
 
 
 def _strengths(picture: Image) -> NDArray[np.float32]:
@@ -125,13 +114,13 @@ def _maxima(strengths: NDArray[np.float32]) -> FloatArray:
 
 def _repeated(rows: IndexArray, columns: IndexArray, values: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Tell which maxima (N,), sorted by value, are of the same plateau as one before."""
-    begins = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0) + 1, [len(values)]])
     repeated = np.zeros(len(values), dtype=bool)
-    for group in np.flatnonzero(np.diff(begins) > 1):
-        part = slice(begins[group], begins[group + 1])
-        u, v = columns[part], rows[part]
-        near = np.maximum(np.abs(u[:, np.newaxis] - u), np.abs(v[:, np.newaxis] - v)) < ALONE_PX
-        repeated[part] = np.tril(near, -1).any(axis=1)
+    for lag in range(1, len(values)):
+        same = values[lag:] == values[:-lag]
+        if not same.any():
+            break
+        u, v = np.abs(columns[lag:] - columns[:-lag]), np.abs(rows[lag:] - rows[:-lag])
+        repeated[lag:] |= same & (np.maximum(u, v) < ALONE_PX)
     return repeated
 
 

@@ -19,7 +19,7 @@ from handeye.detection.corner_fit import (
     spread,
 )
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.edge_shift import without_edge_shift
+from handeye.detection.edge_shift import unknown_shift_px, without_edge_shift
 from handeye.detection.marker_lattice import contradiction
 from handeye.detection.markers import (
     LEAST_SHARE,
@@ -31,6 +31,7 @@ from handeye.detection.markers import (
     from_neighbours,
 )
 from handeye.detection.registration import Aligned
+from handeye.detection.saddles import sampled
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.target import MarkerCorners
 from handeye.types.target.artwork import Squares
@@ -41,7 +42,10 @@ WINDOW_SHARE = 0.8
 BAND_SHARE = 0.8
 # Tags read where they are expected.
 FEWEST_TAGS = 2
-# Tried until all tags are found; one leaves the ink as it is.
+# A side of a marker is dark on one side of a line, so far from it, at so many of its places, this share of
+# the usual step or more.
+SIDE_SAMPLES, ASIDE_PX, SIDE_SHARE, SIDE_CONTRAST = 24, 2.0, 0.8, 0.3
+# Tried until all tags are found, the last only if some are; one leaves the ink as it is.
 THINNING_PX = (3, 1, 5)
 
 
@@ -88,8 +92,11 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
     good = good[np.linalg.norm(expected - fits.places[good], axis=1) <= ASTRAY_PX]
     if len(good) < 4:
         return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
+    if len(tags) == 1 and not _has_sides(image, fits.places):
+        return NotFound(Reason.INCOMPLETE, "the marker is seen, but something covers a corner of it")
     sharp = without_edge_shift(plane[good], fits.places[good], _sides(target, tags, steps)[good])
-    return ordered(target, points.ravel()[good], sharp, fits.sigmas_px[good])
+    sigmas = np.hypot(fits.sigmas_px[good], unknown_shift_px(len(good)))
+    return ordered(target, points.ravel()[good], sharp, sigmas)
 
 
 def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | None:
@@ -115,7 +122,8 @@ def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | 
     if good.sum() < max(4, LEAST_SHARE * 4 * expected.sum()):
         return None
     sharp = without_edge_shift(plane[good], fits.places[good], _sides(target, tags, steps)[good])
-    return ordered(target, ids[good], sharp, fits.sigmas_px[good])
+    sigmas = np.hypot(fits.sigmas_px[good], unknown_shift_px(len(good)))
+    return ordered(target, ids[good], sharp, sigmas)
 
 
 def _markers(image: Image, target: MarkerCorners) -> Seen:
@@ -128,6 +136,8 @@ def _markers(image: Image, target: MarkerCorners) -> Seen:
         return find_markers(image, target.dictionary, target.border_bits)
     ids, seen, repeated = NO_IDS, np.zeros((0, 4, 2)), NO_IDS
     for size in THINNING_PX:
+        if size == THINNING_PX[-1] and not len(ids):
+            break
         kernel = np.ones((size, size), dtype=np.uint8)
         thinned = image if size == 1 else np.asarray(cv2.dilate(image, kernel), dtype=np.uint8)
         more = find_markers(thinned, target.dictionary, target.border_bits)
@@ -142,6 +152,23 @@ def _markers(image: Image, target: MarkerCorners) -> Seen:
             break
     once = ~np.isin(ids, repeated)
     return Seen(ids[once], seen[once], repeated)
+
+
+def _has_sides(image: Image, corners: FloatArray) -> bool:
+    """Tell whether the sides between the corners (4, 2) of a marker are its edges, from corner to corner.
+
+    Other markers would tell that a corner is not where it should be; of a single one the sides do.
+    """
+    before, after = corners, np.roll(corners, -1, axis=0)
+    along = np.linspace(0.05, 0.95, SIDE_SAMPLES)[:, np.newaxis]
+    line = before[:, np.newaxis] + along * (after - before)[:, np.newaxis]
+    across = (after - before)[:, ::-1] * [1.0, -1.0]
+    across *= (ASIDE_PX / np.maximum(np.linalg.norm(across, axis=1), 1e-9))[:, np.newaxis]
+    # Outwards, whichever way the corners go around.
+    across *= np.sign(((line.mean(axis=1) - corners.mean(axis=0)) * across).sum(axis=1))[:, np.newaxis]
+    step = sampled(image, line + across[:, np.newaxis]) - sampled(image, line - across[:, np.newaxis])
+    is_edge = step >= SIDE_CONTRAST * max(float(np.median(step)), 0.0)
+    return bool((is_edge & (step > 0)).mean(axis=1).min() >= SIDE_SHARE)
 
 
 def _side(target: MarkerCorners) -> float:

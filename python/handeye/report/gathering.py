@@ -16,6 +16,7 @@ from handeye.importing import Opened
 from handeye.report import document
 from handeye.report.advice import advice
 from handeye.report.document import Answer, NoiseLevels, Open, Report, Said, ViewLine, Within
+from handeye.report.drawings import Drawing, drawings_of
 from handeye.report.history import arm_of, attempts, curve, request
 from handeye.report.recipe import recipe
 from handeye.report.regions import USUAL_DISTANCES_M, at_points, position_axes, rotation_axes, within
@@ -53,11 +54,12 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Gathered:
-    """Numbers, and what the pictures are drawn from."""
+    """Numbers, and what the pictures are drawn from; camera pictures only where they were asked for."""
 
     numbers: Report
     scene: Scene
     pictures: tuple[ViewPicture, ...] = ()
+    drawings: tuple[Drawing, ...] | None = None
 
 
 def gather_recording(
@@ -67,6 +69,7 @@ def gather_recording(
     command: str,
     reduced: bool = False,
     made: str | None = None,
+    is_drawn: bool = False,
 ) -> Gathered:
     """Solve a recording and gather what there is to say.
 
@@ -80,6 +83,8 @@ def gather_recording(
         The command line that makes this report.
     made
         Time to write into it, ISO 8601; None for none.
+    is_drawn
+        Whether the camera's pictures are to be shown with what was found in them.
 
     Raises
     ------
@@ -127,7 +132,7 @@ def gather_recording(
     )
     put_right = corrected(measurements, kinematics, calibration.arm_correction)
     pictures = tuple(view_picture(calibration, put_right, view) for view in put_right.views)
-    return Gathered(numbers, scene, pictures)
+    return Gathered(numbers, scene, pictures, drawings_of(opened) if is_drawn else None)
 
 
 def gather_result(path: Path, *, command: str, made: str | None = None) -> Gathered:

@@ -99,6 +99,7 @@ def _context(gathered: Gathered) -> dict[str, Any]:
         "tiles_note": tiles_note,
         "scale": tiles.scale,
         "scale_bar": scale_bar(),
+        "drawings": gathered.drawings,
         "matrix": "\n".join("  ".join(f"{v: .9f}" for v in row) for row in r.answer.T_parent_camera),
         "exports": [(EXPORTERS[name].title, text) for name, text in r.exports.items()],
     }
