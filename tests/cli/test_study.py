@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+import handeye
 from handeye.cli.boundary import run
 from handeye.datasets import write_recording
 from handeye.simulation.cells import CellOptions, ErrorKind, simulate
@@ -26,6 +27,13 @@ def study(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> tuple[i
     """Run a study with --json; exit code and document."""
     code = run(["study", *map(str, arguments), "--json", "--workers", "1"])
     return code, json.loads(capsys.readouterr().out)
+
+
+def written(path: Path) -> dict[str, Any]:
+    """Return what a study has written, which also says by what it was made."""
+    document = json.loads(path.read_text())
+    assert document.pop("versions")["handeye"] == handeye.__version__
+    return document
 
 
 def test_table1_has_the_promised_keys(data: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -50,7 +58,7 @@ def test_table1_has_the_promised_keys(data: Path, capsys: pytest.CaptureFixture[
                 assert part["policies"][policy][metric].keys() >= {"mean", "median", "trials"}
                 assert part["policies"][policy][metric]["mean"] > 0
             assert part["policies"][policy]["trials"] == 3
-    assert json.loads((tmp_path / "new" / "table1.json").read_text()) == document
+    assert written(tmp_path / "new" / "table1.json") == document
     assert (tmp_path / "new" / "table1.png").read_bytes().startswith(b"\x89PNG")
     assert study(capsys, *arguments)[1] == document
     assert study(capsys, *arguments, "--seed", "1")[1]["policies"] != document["policies"]
@@ -183,7 +191,7 @@ def test_mistakes_have_the_promised_keys(capsys: pytest.CaptureFixture[str], tmp
         assert (found["named"], found["answered"], found["repaired"]) == (1.0, 1.0, 1.0)
         assert found["wrong_answers"] == 0
         assert found["translation_mm"] < 2 * found["clean_translation_mm"]
-    assert json.loads((tmp_path / "mistakes.json").read_text()) == document
+    assert written(tmp_path / "mistakes.json") == document
     assert run(["study", "mistakes", "--trials", "1", "--kinds", "flip", "--workers", "1"]) == 0
     assert "false alarms: 0.0 % of 1 recordings" in capsys.readouterr().out
 

@@ -47,7 +47,7 @@ def test_the_candidates_follow_from_the_seed(tmp_path: Path) -> None:
         prepared = prepare(configured(5))
         changed = configured(seed)
         session, store = begin(prepared, tmp_path / str(number))
-        session._chooser._wish = changed.wish()  # type: ignore[attr-defined]
+        session._decide.__self__._wish = changed.wish()  # type: ignore[attr-defined]
         for _ in range(3):
             session.take(session.next())  # type: ignore[arg-type]
         step = session.next()
