@@ -3,7 +3,7 @@
 The chance in a decision follows from the seed and the attempts so far.
 """
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,9 +20,9 @@ from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
 from handeye.session.deciding import Attempts, EndReason, Halt, Step
 from handeye.session.safety import body_of
-from handeye.session.starting import Start, largest_tilt_rad, starting_goal
+from handeye.session.starting import LARGEST_TILT_RAD, Start, largest_tilt_rad, starting_goal
 from handeye.session.wish import Wish
-from handeye.types import MountedCamera, Pose, Station
+from handeye.types import Pose, RigRecording, Station
 from handeye.types.arrays import FloatArray
 
 # Postures are drawn about those of the stations, some near and some far.
@@ -56,8 +56,8 @@ class RigChooser:
     ----------
     arm, workspace
         The arm, and what no motion may leave.
-    cameras
-        By name.
+    recording
+        Whose cameras and targets these are.
     start
         Where the arm stood when the session began.
     wish
@@ -74,7 +74,7 @@ class RigChooser:
         self,
         arm: Arm,
         workspace: Workspace,
-        cameras: Mapping[str, MountedCamera],
+        recording: RigRecording,
         start: Start,
         wish: Wish,
         solids: SolidLinks | None = None,
@@ -83,7 +83,7 @@ class RigChooser:
         limits: ViewLimits,
     ) -> None:
         self._arm, self._workspace, self._solids = arm, workspace, solids
-        self._cameras, self._start, self._wish = cameras, start, wish
+        self._recording, self._start, self._wish = recording, start, wish
         self._request = request_of(wish)
         self._candidates = candidates
         self._limits = limits
@@ -122,36 +122,44 @@ class RigChooser:
         return np.random.default_rng([self._wish.seed, 4, len(situation.entries)])
 
     def _starting(self, situation: RigSituation) -> Step | Halt:
-        """Turn a little about the start; less, and the other way, after a turn that lost a target."""
-        stations = situation.stations
-        seen = [{(one.camera, one.target) for one in station.views} for station in stations]
-        whole = [k for k, pairs in enumerate(seen) if pairs >= seen[0]]
-        # Stations that lost some of what was seen at first are kept, and are failures of the turn.
-        lost = len(stations) - 1 - whole[-1] if stations else 0
+        """Turn a little about the start; the other way, and then less, after a turn that lost a target."""
+        seen = [self._moving(station) for station in situation.stations]
         tilts = [
-            largest_tilt_rad(one.view, self._cameras[one.camera].camera)
-            for station in stations[:1]
+            largest_tilt_rad(one.view, self._recording.cameras[one.camera].camera)
+            for station in situation.stations[:1]
             for one in station.views
+            if (one.camera, one.target) in seen[0]
         ]
+        number, failures = _turns(seen)
         found = starting_goal(
             self._start,
-            len(whole),
-            lost + len(situation.counted),
-            min(tilts, default=0.0),
+            number,
+            failures + len(situation.counted),
+            min(tilts, default=LARGEST_TILT_RAD),
             body_of(self._arm, self._workspace, self._solids, situation.believed),
             situation.standing(self._start),
         )
         if found is None:
-            blind = [name for name in self._cameras if all(name != c for pairs in seen for c, _ in pairs)]
+            cameras = self._recording.cameras
+            blind = [name for name in cameras if all(name != c for pairs in seen for c, _ in pairs)]
             return Halt(
                 EndReason.NO_START,
-                f"not tied to the arm by turns about where it stands: {', '.join(blind or self._cameras)}; "
+                f"not tied to the arm by turns about where it stands: {', '.join(blind or cameras)}; "
                 "drive it to where every camera sees a target, away from the ends of the workspace and of "
                 "the joints, and begin again",
             )
         pose, joints = found
         goal = Goal(situation.label("station"), pose, tuple(joints.tolist()), self._wish.speed_rad_s)
         return Step(goal, "start", {}, None, believed=situation.believed)
+
+    def _moving(self, station: Station) -> set[tuple[str, str]]:
+        """Return the cameras and targets of a station that the arm moves against each other."""
+        cameras, targets = self._recording.cameras, self._recording.targets
+        return {
+            (one.camera, one.target)
+            for one in station.views
+            if cameras[one.camera].body is not targets[one.target].body
+        }
 
     def _planned(self, situation: RigSituation, believed: RigEstimate) -> Step | Halt:
         random = self._random(situation)
@@ -203,6 +211,26 @@ class RigChooser:
         pose, speed = Pose(self._arm.forward(joints)), self._wish.speed_rad_s
         goal = Goal(situation.label("station"), pose, tuple(joints.tolist()), speed)
         return Step(goal, phase, decision, None, believed=situation.believed)
+
+
+def _turns(seen: Sequence[set[tuple[str, str]]]) -> tuple[int, int]:
+    """Return the number of the next turn, and how many tries at a turn count as failed.
+
+    A turn that lost some of what the first station saw is tried the other way, no more: the stations are
+    kept, and several turns about one axis determine nothing. All turns after it are smaller.
+
+    Parameters
+    ----------
+    seen
+        Cameras and targets of each station.
+    """
+    number, tries, smaller = min(len(seen), 1), 0, 0
+    for pairs in seen[1:]:
+        whole = pairs >= seen[0]
+        tries = 0 if whole else tries + 1
+        if whole or tries == 2:
+            number, smaller, tries = number + 1, smaller + tries, 0
+    return number, smaller + tries
 
 
 def request_of(wish: Wish) -> RigRequest | None:
