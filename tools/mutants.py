@@ -56,7 +56,7 @@ MUTANTS = (
     Mutant("joints of the goal are numbers", SAFETY, "or not np.isfinite(joints).all()", "", T_SAFETY),
     Mutant("way to the goal", SAFETY, "return body.obstacle_on_path(standing_rad, joints)", "return body.obstacles(joints[np.newaxis])[0]", T_SAFETY),
     Mutant("nothing checked at all", SAFETY, "return body.obstacle_on_path(standing_rad, joints)", "return None", T_SAFETY),
-    Mutant("tool takes part", SAFETY, "return Body(arm, workspace, mounted_points(estimate), solids)", "return Body(arm, workspace, solids=solids)", T_SAFETY),
+    Mutant("tool takes part", SAFETY, "return Body(arm, workspace, mounted_points(believed), solids)", "return Body(arm, workspace, solids=solids)", T_SAFETY),
     Mutant("check before sending", ATTEMPT, "    if why is not None:\n        return Missed(Failure.MOTION_REFUSED", "    if False:\n        return Missed(Failure.MOTION_REFUSED", T_SAFETY),
     Mutant("a dry run moves nothing", "cli/run.py", "if dry_run or session is None:", "if session is None:", "end_to_end/test_run.py"),
     Mutant("confirmation", ATTEMPT, "if cell.confirm is not None and not cell.confirm(goal):", "if False:", T_LOOP),

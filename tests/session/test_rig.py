@@ -56,6 +56,20 @@ def test_a_request_for_all_cameras_is_met_and_kept(tmp_path: Path) -> None:
     assert sum(kept) >= 15  # of 16, at 95 %
 
 
+def test_an_arm_without_room_for_its_tool_goes_back_the_way_it_came(tmp_path: Path) -> None:
+    """The last small turn ends where the board on the flange, once it is known, touches the arm."""
+    asked = replace(RIG, seed=107, most_views=8, rig=RigSettings(candidates=100))
+    end = run_rig(asked, tmp_path / "s")
+    assert end.reason is EndReason.VIEWS_TAKEN
+    store = open_rig_session(tmp_path / "s")
+    store.close()
+    phases = [entry.phase for entry in store.entries]
+    first = phases.index("back")
+    assert phases[first:] == ["back", "back", "plan", "plan"]
+    for k, joints in enumerate(entry.goal_joints for entry in store.entries[first : first + 2]):
+        assert joints == pytest.approx(store.entries[first - 2 - k].standing_rad)
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_run_that_is_killed_goes_on_as_if_nothing_had_been(
     finished: Path, tmp_path: Path, seed: int

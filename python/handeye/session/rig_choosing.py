@@ -4,14 +4,14 @@ The chance in a decision follows from the seed and the attempts so far.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from handeye.estimation import RigEstimate
 from handeye.planning.candidates import Candidate, Pool
-from handeye.planning.collisions import Workspace
+from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import ViewLimits
 from handeye.planning.prediction import Sight
 from handeye.planning.rig import FEWEST_STATIONS, RigRequest, rig_gains
@@ -25,6 +25,8 @@ from handeye.session.wish import Wish
 from handeye.types import Pose, RigRecording, Station
 from handeye.types.arrays import FloatArray
 
+# The phase of a step back.
+BACK = "back"
 # Postures are drawn about those of the stations, some near and some far.
 SPREADS_RAD = (0.1, 0.8)
 # Candidates whose straight path is looked at.
@@ -182,7 +184,7 @@ class RigChooser:
         reached = self._reached(situation, joints, -np.nan_to_num(found.gains, nan=-np.inf))
         reached = [i for i in reached if np.isfinite(found.gains[i])]
         if not reached:
-            return Halt(EndReason.NO_CANDIDATE, "no posture left from which a camera should see a target")
+            return self._without_candidate(situation, body)
         # After a failure the next best: the same place would most likely fail alike.
         best = reached[min(len(situation.counted), len(reached) - 1)]
         decision = {
@@ -195,6 +197,31 @@ class RigChooser:
             },
         }
         return self._step(situation, joints[best], "plan", decision)
+
+    def _without_candidate(self, situation: RigSituation, body: Body) -> Step | Halt:
+        """Go back the way the arm came where it stands too near to something; else turn about the start.
+
+        What is mounted on the flange is not known at first, so that a turn may end where it has no room.
+        """
+        standing = situation.standing(self._start)
+        if standing is not None and body.obstacles(np.array(standing)[np.newaxis])[0] is not None:
+            joints = self._came_from(situation)
+            if joints is not None:
+                # Judged as the way there was, by the arm alone.
+                return replace(self._step(situation, np.array(joints), BACK, {}), believed=None)
+        step = self._starting(situation)
+        if isinstance(step, Step):
+            return step
+        return Halt(EndReason.NO_CANDIDATE, "no posture left from which a camera should see a target")
+
+    def _came_from(self, situation: RigSituation) -> tuple[float, ...] | None:
+        """Return the joints from which the arm came where it stands, on a way that it has not gone back."""
+        entries = situation.entries
+        backs = next((k for k, entry in enumerate(reversed(entries)) if entry.phase != BACK), len(entries))
+        before = entries[: max(len(entries) - 1 - 2 * backs, 0)]
+        if not before or not all(entry.moved for entry in entries[len(before) :]):
+            return None
+        return replace(situation, entries=before).standing(self._start)
 
     def _reached(self, situation: RigSituation, joints: FloatArray, order: FloatArray) -> list[int]:
         """Return the first in order of these postures (N, n) to which the way is free."""
