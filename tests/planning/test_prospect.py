@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from handeye.estimation import Measurements, make_estimator
-from handeye.planning.prospect import MANY_VIEWS, OutOfReach, prospect
+from handeye.planning.prospect import FEWEST_VIEWS, MANY_VIEWS, OutOfReach, prospect
 from handeye.planning.stopping import State, StopReason
 from handeye.session.wish import Wish
 from handeye.simulation.cells import CellOptions, ErrorKind, simulate
@@ -32,12 +32,12 @@ def test_a_forecast_is_near_what_many_views_come_to(measurements: Measurements) 
 
 def test_what_is_far_out_of_reach_is_refused_within_six_views(measurements: Measurements) -> None:
     estimator = make_estimator(ModelName.AUTO)
-    for count in (4, 5, 6):
+    for count in (FEWEST_VIEWS - 1, FEWEST_VIEWS):
         taken = measurements.select(range(count))
         state = State(taken, estimator(taken), np.ones(1))
         then = prospect(state.estimate, taken)
         stop = OutOfReach(then.translation_mm / 10, then.rotation_deg / 10).verdict(state)
-        assert (stop is not None) == (count >= 5)
+        assert (stop is not None) == (count >= FEWEST_VIEWS)
         if stop is not None:
             assert stop.reason is StopReason.OUT_OF_REACH
             assert "this arm cannot reach" in stop.sentence

@@ -13,10 +13,10 @@ from handeye.planning.stopping import State, Stop, StopReason, StopRule
 # As many as anybody takes.
 MANY_VIEWS = 40
 # From so few on it is asked: before, nobody knows how noisy the arm is.
-FEWEST_VIEWS = 5
+FEWEST_VIEWS = 6
 # A request is refused where even many views would miss it by this factor: what is believed of the noise after
-# few views is rough.
-MARGIN = 1.5
+# few views is rough, and the first of them tell less than those that are chosen later.
+MARGIN = 4.0
 # Of views that do not determine the answer, a forecast beyond this is what they leave open, not the arm.
 OPEN_MM = 100.0
 
