@@ -36,8 +36,8 @@ LARGER = 1.5
 # A circle may be off from where those around it put it by this much, or this share of the way to the next;
 # one that something covers in part is off by more. Of the circles so many must be measured well.
 OFF_PX, OFF_SHARE, LEAST_MEASURED = 0.6, 0.02, 0.6
-# Its area may differ from the others' by this share, or by so many times what theirs usually do.
-SIZE_OFF, SIZE_OFF_SPREADS = 0.015, 5.0
+# Its area may differ by this share from what those of the others tell, or by so many times what is usual.
+SIZE_OFF, SIZE_OFF_SPREADS, FEWEST_FOR_SIZES = 0.015, 5.0, 16
 # A circle further from where it was expected, as a share of the root of its area, or of another size, is
 # something else.
 ASTRAY_SHARE, AREA_RATIO = 0.3, 1.5
@@ -97,13 +97,20 @@ def _fit_others(target: CircleGrid, ids: IndexArray, circles: Spots) -> NDArray[
     np.fill_diagonal(away, np.inf)
     off = np.linalg.norm(from_neighbours(plane, pixels) - pixels, axis=1)
     fits = np.asarray(off <= np.maximum(OFF_PX, OFF_SHARE * away.min(axis=1)), dtype=np.bool_)
+    whole = _core.PlaneMap.fitted(plane, pixels) if len(ids) >= FEWEST_FOR_SIZES else None
+    if whole is not None:
+        # Of a small grid neighbours are far away, and a strong lens bends what lies between.
+        fits |= np.linalg.norm(whole.pixels(plane) - pixels, axis=1) <= OFF_PX / 2
     # At the rim of the grid neighbours tell little, but a cover adds to the size or takes from it.
     alike = np.flatnonzero(fits & (ids != (-1 if target.marked is None else target.marked)))
-    lens = _core.PlaneMap.fitted(plane[alike], pixels[alike]) if len(alike) >= FEWEST_TOGETHER else None
+    lens = _core.PlaneMap.fitted(plane[alike], pixels[alike]) if len(alike) >= FEWEST_FOR_SIZES else None
     if lens is not None:
         outlines = _outlines(pixels[alike], lens.steps(plane[alike], 1e-3 * np.ptp(plane)))
         sizes = np.log(circles.areas[alike] / outlines.areas)
-        sizes = np.abs(sizes - np.median(sizes))
+        # What the map does not know of a strong lens is smooth.
+        x, y = ((plane[alike] - plane.mean(axis=0)) / np.ptp(plane)).T
+        columns = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+        sizes = np.abs(sizes - columns @ np.linalg.lstsq(columns, sizes, rcond=None)[0])
         fits[alike] = sizes <= max(SIZE_OFF, SIZE_OFF_SPREADS * 1.4826 * float(np.median(sizes)))
     return fits
 
