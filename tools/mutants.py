@@ -43,7 +43,9 @@ T_SAFETY, T_JOURNAL, T_CALLS = (
 )
 T_READING, T_FOLDER, T_MANUAL = "robots/test_reading.py", "cameras/test_folder.py", "robots/test_manual.py"
 T_RULES, T_LOOP, T_BREAKS = "session/test_rules.py", "session/test_loop.py", "session/test_breaks.py"
+T_RIG = "session/test_rig.py"
 T_COLLISIONS = "planning/test_collisions.py"
+DECIDING, STEPPING, COMPARING = "session/deciding.py", "session/stepping.py", "session/comparing.py"
 SELF, T_SELF = "session/self_calibration.py", "session/test_self_calibration.py"
 
 # fmt: off
@@ -56,7 +58,10 @@ MUTANTS = (
     Mutant("joints of the goal are numbers", SAFETY, "or not np.isfinite(joints).all()", "", T_SAFETY),
     Mutant("way to the goal", SAFETY, "return body.obstacle_on_path(standing_rad, joints)", "return body.obstacles(joints[np.newaxis])[0]", T_SAFETY),
     Mutant("nothing checked at all", SAFETY, "return body.obstacle_on_path(standing_rad, joints)", "return None", T_SAFETY),
-    Mutant("tool takes part", SAFETY, "return Body(arm, workspace, mounted_points(estimate), solids)", "return Body(arm, workspace, solids=solids)", T_SAFETY),
+    Mutant("tool takes part", SAFETY, "return Body(arm, workspace, mounted_points(believed), solids)", "return Body(arm, workspace, solids=solids)", T_SAFETY),
+    Mutant("what is mounted with several cameras takes part", SAFETY, "return Body(arm, workspace, mounted_on_flange(believed), solids)", "return Body(arm, workspace, solids=solids)", T_RIG),
+    Mutant("an arm goes back where its tool has no room", "session/rig_choosing.py", "            if joints is not None:\n", "            if False:\n", T_RIG),
+    Mutant("a rig's turns go on to the next axis", "session/rig_choosing.py", "if whole or tries == 2:", "if whole:", T_RIG),
     Mutant("check before sending", ATTEMPT, "    if why is not None:\n        return Missed(Failure.MOTION_REFUSED", "    if False:\n        return Missed(Failure.MOTION_REFUSED", T_SAFETY),
     Mutant("a dry run moves nothing", "cli/run.py", "if dry_run or session is None:", "if session is None:", "end_to_end/test_run.py"),
     Mutant("confirmation", ATTEMPT, "if cell.confirm is not None and not cell.confirm(goal):", "if False:", T_LOOP),
@@ -66,9 +71,9 @@ MUTANTS = (
     Mutant("workspace of the tool", "planning/collisions.py", "ends = np.concatenate([frames[:, -1:, :3, 3], tools], axis=1)", "ends = frames[:, -1:, :3, 3]", T_SAFETY),
     Mutant("touching itself", "planning/collisions.py", "touching[left] = self._touches_itself(", "touching[left] = False & self._touches_itself(", T_COLLISIONS),
     Mutant("the way, not its end alone", "planning/collisions.py", "why = self.obstacles(np.concatenate([path[1:] for path in paths]))", "why = self.obstacles(np.concatenate([np.tile(path[-1:], (len(path) - 1, 1)) for path in paths]))", T_COLLISIONS),
-    Mutant("where the arm stands, in decisions", CHOOSING, "if entry.standing_rad is not None:\n                return entry.standing_rad", "if False:\n                return ()", T_SAFETY),
-    Mutant("paths from the posture of the start", CHOOSING, "        for entry in reversed(situation.entries):\n            if entry.standing_rad", "        for entry in ():\n            if entry.standing_rad", T_SAFETY),
-    Mutant("speed passed on", CHOOSING, "return Goal(label, pose, joints, self._speed_rad_s)", "return Goal(label, pose, joints)", T_SAFETY),
+    Mutant("where the arm stands, in decisions", DECIDING, "for joints in (entry.standing_rad, told,", "for joints in (told,", T_SAFETY),
+    Mutant("paths from the posture of the start", DECIDING, "        for entry in reversed(self.entries):\n            told", "        for entry in ():\n            told", T_SAFETY),
+    Mutant("speed passed on", CHOOSING, 'return Goal(situation.label("view"), pose, joints, self._speed_rad_s)', 'return Goal(situation.label("view"), pose, joints)', T_SAFETY),
     Mutant("speed of the slowest joint", CHOOSING, "return min([self._wish.speed_rad_s, *turning.tolist()])", "return self._wish.speed_rad_s", T_SAFETY),
     Mutant("start where it may go", "session/configuration.py", '    if why is not None:\n        raise InputError(\n            f"the arm stands', '    if False:\n        raise InputError(\n            f"the arm stands', T_SAFETY),
     # What is believed.
@@ -80,7 +85,7 @@ MUTANTS = (
     Mutant("reading: degrees named", READING, 'yield "the joint positions are in degrees, expected radians", radians', "pass", T_READING),
     Mutant("reading: inverse named", READING, "(inverse, reported.inverse()),", "", T_READING),
     Mutant("checked before every motion", ATTEMPT, "reading = checked_reading(answer, self.arm, joints_needed=not self.by_hand, expected=expected)", "reading = typed_reading(answer)", T_SAFETY),
-    Mutant("contract at the start", LOOP, "        check_at_rest(self._cell)\n", "", T_SAFETY),
+    Mutant("contract at the start", STEPPING, "        check_at_rest(self._cell)\n", "", T_SAFETY),
     Mutant("stop works before the first motion", "session/contract.py", '    if why is not None:\n        raise DeviceError(\n            f"the robot cannot be stopped', '    if False:\n        raise DeviceError(\n            f"the robot cannot be stopped', T_SAFETY),
     Mutant("rest before the first motion", "session/contract.py", "if not is_near(first.T_base_flange, second.T_base_flange, REST_M, REST_RAD):\n        raise", "if False:\n        raise", T_SAFETY),
     Mutant("stop after a failure", ATTEMPT, "    if not refused:\n        stopped = cell.stop()", "    if False:\n        stopped = cell.stop()", T_SAFETY),
@@ -88,7 +93,7 @@ MUTANTS = (
     Mutant("a robot that does not move", ATTEMPT, "before.T_base_flange, after.T_base_flange, STILL_M, STILL_RAD\n    ):", "before.T_base_flange, after.T_base_flange, STILL_M, STILL_RAD\n    ) and False:", T_SAFETY),
     Mutant("workspace of the pose read back", ATTEMPT, 'return "outside the workspace"', "return None", T_SAFETY),
     Mutant("posture read back", ATTEMPT, "return body.obstacles(np.array(reading.joints_rad)[np.newaxis])[0]", "return None", T_SAFETY),
-    Mutant("stop where a motion ended wrongly", ATTEMPT, "        if why is not None:\n            cell.stop()", "        if why is not None:\n            pass", T_SAFETY),
+    Mutant("stop where a motion ended wrongly", ATTEMPT, "    if why is not None:\n        cell.stop()\n        return Missed(Failure.ELSEWHERE", "    if why is not None:\n        return Missed(Failure.ELSEWHERE", T_SAFETY),
     # One command at a time.
     Mutant("wait for the last call", CALLS, "        self.wait(seconds)\n        return self._called(seconds, call, arguments, self._idle)", "        return self._called(seconds, call, arguments, self._idle)", T_CALLS),
     Mutant("stop goes beside", CALLS, "return self._called(seconds, call, arguments, threading.Event())", "return self.run(seconds, call, *arguments)", T_CALLS),
@@ -96,8 +101,8 @@ MUTANTS = (
     Mutant("short messages", CALLS, "MAX_MESSAGE = 300", "MAX_MESSAGE = 300_000", T_CALLS),
     Mutant("what can be shown", "errors.py", 'c if c.isprintable() else " " if c.isspace() else "?" for c in cut', "c for c in cut", T_CALLS),
     Mutant("a driver's exit ends no session", CALLS, "except BaseException as error:  # noqa: BLE001 - whatever a driver raises", "except Exception as error:", T_CALLS),
-    Mutant("a robot that hangs ends the session", LOOP, "if self._cell.robot_calls.pending:", "if False:", T_SAFETY),
-    Mutant("a session told to go on goes on", LOOP, "self._forgiven_up_to = situation.entries[-1].number", "pass", T_SAFETY),
+    Mutant("a robot that hangs ends the session", STEPPING, "if self._cell.robot_calls.pending:", "if False:", T_SAFETY),
+    Mutant("a session told to go on goes on", STEPPING, "self._forgiven_up_to = situation.entries[-1].number", "pass", T_SAFETY),
     Mutant("views of other arms left out", LOOP, "if (len(view.joints_rad) == len(arm) if view.joints_rad is not None else not needed)", "if True", T_SAFETY),
     # Pictures of now.
     Mutant("stale frames", "cameras/capture.py", "STALE_FRAMES = 5", "STALE_FRAMES = 0", "cameras/test_capture.py"),
@@ -117,14 +122,14 @@ MUTANTS = (
     Mutant("chain of the journal", JOURNAL, "chain = _digest(chain + body)\n        entry", "chain = found or _digest(chain + body)\n        entry", T_JOURNAL),
     Mutant("journal follows from the settings", JOURNAL, 'chain, size, ending = known.digest, 0, b""', 'chain, size, ending = b"", 0, b""', T_JOURNAL),
     Mutant("settings are checked", JOURNAL, "    if changed:\n", "    if False:\n", T_JOURNAL),
-    Mutant("nothing deleted", STORE, "    if more:\n", "    if False:\n", T_JOURNAL),
-    Mutant("edited views", STORE, "elif not _same(view, known[name]):", "elif False:", T_JOURNAL),
-    Mutant("edited camera or mounting", STORE, "if kept.to_dict() != base.to_dict():", "if False:", T_JOURNAL),
+    Mutant("nothing deleted", COMPARING, "    if more:\n", "    if False:\n", T_JOURNAL),
+    Mutant("edited views", COMPARING, "elif not same(one, known[name]):", "elif False:", T_JOURNAL),
+    Mutant("edited camera or mounting", COMPARING, "    if not same_header:\n", "    if False:\n", T_JOURNAL),
     Mutant("lost files made again", STORE, "        if not current:\n", "        if False:\n", T_JOURNAL),
     Mutant("partial files", STORE, "            remove_partials(part)", "            pass", T_JOURNAL),
     Mutant("another arm half-way", "session/settings.py", "if settings.get(name, fingerprint) != fingerprint:", "if False:", T_JOURNAL),
     Mutant("one process at a time", STORE, "fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", T_BREAKS + "::test_two_processes_do_not_write_one_session"),
-    Mutant("interruption stops the arm", LOOP, "            self._cell.stop()\n            raise", "            raise", T_BREAKS + "::test_an_interruption_stops_the_arm_and_leaves_the_session_whole"),
+    Mutant("interruption stops the arm", STEPPING, "            self._cell.stop()\n            raise", "            raise", T_BREAKS + "::test_an_interruption_stops_the_arm_and_leaves_the_session_whole"),
     Mutant("torn line said", JOURNAL, "torn + len(rest))", "0)", T_JOURNAL),
     Mutant("zeros for a line", JOURNAL, 'if whole and not rest.strip(b"\\0") and b"\\0" in whole[-1]:', "if False:", T_JOURNAL),
     # A camera that nobody has calibrated.
@@ -132,7 +137,7 @@ MUTANTS = (
     Mutant("a wrong view does not teach", SELF, "return worst if errors[worst] > limit else None", "return None", T_SELF),
     Mutant("no picture of a flat target", "session/judging.py", "if not rms <= LARGEST_BEND * extent:", "if False:", T_SELF),
     Mutant("pixels of the same pictures count once", SELF, "from_views=True", "from_views=False", T_SELF),
-    Mutant("edited camera of a session that learns it", STORE, "if same_camera(kept.camera, then):", "if True:", T_SELF),
+    Mutant("edited camera of a session that learns it", STORE, "if not same_camera(found.recording.camera, then):", "if False:", T_SELF),
     Mutant("the camera follows from the views", STORE, "grown if self.self_calibration is None else", "grown if True else", T_SELF),
     Mutant("begun with what was known then", "session/configuration.py", "recording = store.begun_with", "recording = store.recording", T_SELF),
     Mutant("a turn is no other lens", "estimation/lens_confidence.py", "return off - turns @ explained", "return off", "estimation/test_lens_confidence.py"),

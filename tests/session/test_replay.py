@@ -84,7 +84,9 @@ def test_views_chosen_for_their_gain_teach_more_than_random_ones(tmp_path: Path)
 def test_it_goes_on_where_it_was_broken_off(tmp_path: Path) -> None:
     folder = written(made_recording(9), tmp_path / "source")
     replayed(folder, tmp_path / "whole")
-    configuration = Configuration(None, f"replay:{folder}", "replay", accuracy_mm=None, most_views=99)
+    configuration = Configuration(
+        None, driver=f"replay:{folder}", images="replay", accuracy_mm=None, most_views=99
+    )
     session, store = begin(prepare(configuration), tmp_path / "broken")
     for _ in range(5):
         step = session.next()
@@ -122,7 +124,7 @@ def test_pictures_come_along_where_they_were_kept(tmp_path: Path) -> None:
     views = tuple(replace(view, image=None) if view is bare else view for view in source.views)
     folder = tmp_path / "kept"
     write_recording(replace(source, views=views), folder, images_from=tmp_path / "source")
-    prepared = prepare(Configuration(None, f"replay:{folder}", "replay", accuracy_mm=None))
+    prepared = prepare(Configuration(None, driver=f"replay:{folder}", images="replay", accuracy_mm=None))
     (folder / str(broken.image)).unlink()
     session, store = begin(prepared, tmp_path / "s")
     end = session.run()

@@ -31,16 +31,43 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_request_for_all_cameras_is_met_and_kept(tmp_path: Path) -> None:
-    asked = Configuration("ur5e", 5.0, 0.5, seed=6, rig=RigSettings(candidates=100))
-    prepared = rig_cell(asked)
-    session, store = begin_rig(prepared, tmp_path / "s")
-    end = session.run()
+    kept: list[bool] = []
+    for seed in (5, 100, 101, 102):
+        asked = Configuration(
+            "ur5e",
+            accuracy_mm=1.5,
+            accuracy_deg=0.15,
+            most_views=12,
+            seed=seed,
+            rig=RigSettings(candidates=100),
+        )
+        prepared = rig_cell(asked)
+        session, store = begin_rig(prepared, tmp_path / str(seed))
+        end = session.run()
+        phases = [entry.phase for entry in store.entries]
+        store.close()
+        assert end.reason is EndReason.ACCURACY_REACHED, seed
+        assert end.calibration is not None
+        # Turns that lose a board are not repeated until they keep it.
+        assert phases.count("start") <= 5, seed
+        run = judged(prepared, end)
+        assert set(run.inside) == {"left", "right", "front", "side"}
+        kept += run.inside.values()
+    assert sum(kept) >= 15  # of 16, at 95 %
+
+
+def test_an_arm_without_room_for_its_tool_goes_back_the_way_it_came(tmp_path: Path) -> None:
+    """The last small turn ends where the board on the flange, once it is known, touches the arm."""
+    asked = replace(RIG, seed=107, most_views=8, rig=RigSettings(candidates=100))
+    end = run_rig(asked, tmp_path / "s")
+    assert end.reason is EndReason.VIEWS_TAKEN
+    store = open_rig_session(tmp_path / "s")
     store.close()
-    assert end.reason is EndReason.ACCURACY_REACHED
-    assert end.calibration is not None
-    run = judged(prepared, end)
-    assert set(run.inside) == {"left", "right", "front", "side"}
-    assert all(run.inside.values())
+    phases = [entry.phase for entry in store.entries]
+    first = phases.index("back")
+    assert phases[first:] == ["back", "back", "plan", "plan"]
+    for k, joints in enumerate(entry.goal_joints for entry in store.entries[first : first + 2]):
+        assert joints == pytest.approx(store.entries[first - 2 - k].standing_rad)
 
 
 @pytest.mark.parametrize("seed", [1, 2])

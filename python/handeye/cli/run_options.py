@@ -1,7 +1,7 @@
 """Groups of options of `handeye run`: limits of motion, time-outs, and what is wrong in a simulated cell."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -84,7 +84,7 @@ class Rig:
 
     rig: bool = False
     """Drive two cameras on the flange (left, right) and two beside the arm (front, side) at once."""
-    cameras: tuple[str, ...] | None = None
+    cameras: Annotated[tuple[str, ...] | None, Parameter(consume_multiple=True)] = None
     """Those that take part; all four by default."""
     camera_to_camera_mm: float | None = None
     """Ask for cameras of one body in each other too: radius of their position."""

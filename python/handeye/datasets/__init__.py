@@ -17,7 +17,8 @@ from handeye.datasets.read_back import check_written, check_written_rig
 from handeye.datasets.recording_format import LoadedRecording, read_recording
 from handeye.datasets.recording_header import holds_several
 from handeye.datasets.recording_writing import write_recording
-from handeye.datasets.rig_format import LoadedRig, read_rig, rig_warnings, write_rig
+from handeye.datasets.rig_format import LoadedRig, read_rig, rig_warnings
+from handeye.datasets.rig_writing import write_rig
 
 __all__ = [
     "IMPORTERS",

@@ -81,7 +81,7 @@ class Entry:
     label
         View and number of the try at it: `view_04.2`.
     phase
-        `start`, `plan`, `nudge` or `retry`: how the goal was chosen.
+        `start`, `plan`, `nudge`, `back` or `retry`: how the goal was chosen.
     goal, goal_joints
         Where the arm was sent.
     moved

@@ -3,15 +3,15 @@
 The chance in a decision follows from the seed and the attempts so far.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from handeye.estimation import RigEstimate
 from handeye.planning.candidates import Candidate, Pool
-from handeye.planning.collisions import Workspace
+from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import ViewLimits
 from handeye.planning.prediction import Sight
 from handeye.planning.rig import FEWEST_STATIONS, RigRequest, rig_gains
@@ -20,11 +20,13 @@ from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
 from handeye.session.deciding import Attempts, EndReason, Halt, Step
 from handeye.session.safety import body_of
-from handeye.session.starting import Start, largest_tilt_rad, starting_goal
+from handeye.session.starting import LARGEST_TILT_RAD, Start, largest_tilt_rad, starting_goal
 from handeye.session.wish import Wish
-from handeye.types import MountedCamera, Pose, Station
+from handeye.types import Pose, RigRecording, Station
 from handeye.types.arrays import FloatArray
 
+# The phase of a step back.
+BACK = "back"
 # Postures are drawn about those of the stations, some near and some far.
 SPREADS_RAD = (0.1, 0.8)
 # Candidates whose straight path is looked at.
@@ -56,8 +58,8 @@ class RigChooser:
     ----------
     arm, workspace
         The arm, and what no motion may leave.
-    cameras
-        By name.
+    recording
+        Whose cameras and targets these are.
     start
         Where the arm stood when the session began.
     wish
@@ -74,7 +76,7 @@ class RigChooser:
         self,
         arm: Arm,
         workspace: Workspace,
-        cameras: Mapping[str, MountedCamera],
+        recording: RigRecording,
         start: Start,
         wish: Wish,
         solids: SolidLinks | None = None,
@@ -83,7 +85,7 @@ class RigChooser:
         limits: ViewLimits,
     ) -> None:
         self._arm, self._workspace, self._solids = arm, workspace, solids
-        self._cameras, self._start, self._wish = cameras, start, wish
+        self._recording, self._start, self._wish = recording, start, wish
         self._request = request_of(wish)
         self._candidates = candidates
         self._limits = limits
@@ -122,36 +124,44 @@ class RigChooser:
         return np.random.default_rng([self._wish.seed, 4, len(situation.entries)])
 
     def _starting(self, situation: RigSituation) -> Step | Halt:
-        """Turn a little about the start; less, and the other way, after a turn that lost a target."""
-        stations = situation.stations
-        seen = [{(one.camera, one.target) for one in station.views} for station in stations]
-        whole = [k for k, pairs in enumerate(seen) if pairs >= seen[0]]
-        # Stations that lost some of what was seen at first are kept, and are failures of the turn.
-        lost = len(stations) - 1 - whole[-1] if stations else 0
+        """Turn a little about the start; the other way, and then less, after a turn that lost a target."""
+        seen = [self._moving(station) for station in situation.stations]
         tilts = [
-            largest_tilt_rad(one.view, self._cameras[one.camera].camera)
-            for station in stations[:1]
+            largest_tilt_rad(one.view, self._recording.cameras[one.camera].camera)
+            for station in situation.stations[:1]
             for one in station.views
+            if (one.camera, one.target) in seen[0]
         ]
+        number, failures = _turns(seen)
         found = starting_goal(
             self._start,
-            len(whole),
-            lost + len(situation.counted),
-            min(tilts, default=0.0),
+            number,
+            failures + len(situation.counted),
+            min(tilts, default=LARGEST_TILT_RAD),
             body_of(self._arm, self._workspace, self._solids, situation.believed),
             situation.standing(self._start),
         )
         if found is None:
-            blind = [name for name in self._cameras if all(name != c for pairs in seen for c, _ in pairs)]
+            cameras = self._recording.cameras
+            blind = [name for name in cameras if all(name != c for pairs in seen for c, _ in pairs)]
             return Halt(
                 EndReason.NO_START,
-                f"not tied to the arm by turns about where it stands: {', '.join(blind or self._cameras)}; "
+                f"not tied to the arm by turns about where it stands: {', '.join(blind or cameras)}; "
                 "drive it to where every camera sees a target, away from the ends of the workspace and of "
                 "the joints, and begin again",
             )
         pose, joints = found
         goal = Goal(situation.label("station"), pose, tuple(joints.tolist()), self._wish.speed_rad_s)
         return Step(goal, "start", {}, None, believed=situation.believed)
+
+    def _moving(self, station: Station) -> set[tuple[str, str]]:
+        """Return the cameras and targets of a station that the arm moves against each other."""
+        cameras, targets = self._recording.cameras, self._recording.targets
+        return {
+            (one.camera, one.target)
+            for one in station.views
+            if cameras[one.camera].body is not targets[one.target].body
+        }
 
     def _planned(self, situation: RigSituation, believed: RigEstimate) -> Step | Halt:
         random = self._random(situation)
@@ -174,7 +184,7 @@ class RigChooser:
         reached = self._reached(situation, joints, -np.nan_to_num(found.gains, nan=-np.inf))
         reached = [i for i in reached if np.isfinite(found.gains[i])]
         if not reached:
-            return Halt(EndReason.NO_CANDIDATE, "no posture left from which a camera should see a target")
+            return self._without_candidate(situation, body)
         # After a failure the next best: the same place would most likely fail alike.
         best = reached[min(len(situation.counted), len(reached) - 1)]
         decision = {
@@ -187,6 +197,31 @@ class RigChooser:
             },
         }
         return self._step(situation, joints[best], "plan", decision)
+
+    def _without_candidate(self, situation: RigSituation, body: Body) -> Step | Halt:
+        """Go back the way the arm came where it stands too near to something; else turn about the start.
+
+        What is mounted on the flange is not known at first, so that a turn may end where it has no room.
+        """
+        standing = situation.standing(self._start)
+        if standing is not None and body.obstacles(np.array(standing)[np.newaxis])[0] is not None:
+            joints = self._came_from(situation)
+            if joints is not None:
+                # Judged as the way there was, by the arm alone.
+                return replace(self._step(situation, np.array(joints), BACK, {}), believed=None)
+        step = self._starting(situation)
+        if isinstance(step, Step):
+            return step
+        return Halt(EndReason.NO_CANDIDATE, "no posture left from which a camera should see a target")
+
+    def _came_from(self, situation: RigSituation) -> tuple[float, ...] | None:
+        """Return the joints from which the arm came where it stands, on a way that it has not gone back."""
+        entries = situation.entries
+        backs = next((k for k, entry in enumerate(reversed(entries)) if entry.phase != BACK), len(entries))
+        before = entries[: max(len(entries) - 1 - 2 * backs, 0)]
+        if not before or not all(entry.moved for entry in entries[len(before) :]):
+            return None
+        return replace(situation, entries=before).standing(self._start)
 
     def _reached(self, situation: RigSituation, joints: FloatArray, order: FloatArray) -> list[int]:
         """Return the first in order of these postures (N, n) to which the way is free."""
@@ -203,6 +238,26 @@ class RigChooser:
         pose, speed = Pose(self._arm.forward(joints)), self._wish.speed_rad_s
         goal = Goal(situation.label("station"), pose, tuple(joints.tolist()), speed)
         return Step(goal, phase, decision, None, believed=situation.believed)
+
+
+def _turns(seen: Sequence[set[tuple[str, str]]]) -> tuple[int, int]:
+    """Return the number of the next turn, and how many tries at a turn count as failed.
+
+    A turn that lost some of what the first station saw is tried the other way, no more: the stations are
+    kept, and several turns about one axis determine nothing. All turns after it are smaller.
+
+    Parameters
+    ----------
+    seen
+        Cameras and targets of each station.
+    """
+    number, tries, smaller = min(len(seen), 1), 0, 0
+    for pairs in seen[1:]:
+        whole = pairs >= seen[0]
+        tries = 0 if whole else tries + 1
+        if whole or tries == 2:
+            number, smaller, tries = number + 1, smaller + tries, 0
+    return number, smaller + tries
 
 
 def request_of(wish: Wish) -> RigRequest | None:

@@ -66,7 +66,7 @@ class RigPrepared:
         chooser = RigChooser(
             cell.arm,
             cell.workspace,
-            self.recording.cameras,
+            self.recording,
             self.start,
             configuration.wish(),
             cell.solids,

@@ -5,10 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, Self
 
-from handeye.datasets.rig_format import header_of, read_stations_apart, recording_of, update_rig
+from handeye.datasets.rig_format import read_stations_apart, recording_of
+from handeye.datasets.rig_writing import header_of, update_rig
+from handeye.session.comparing import check_same, is_current, same_view
 from handeye.session.entry import stations_of
 from handeye.session.journal import Journal, Settings
-from handeye.session.store import RECORDING_FILE, Store, check_same, create, is_current, opened, same_view
+from handeye.session.store import RECORDING_FILE, Store, create, opened
 from handeye.types import CameraView, RigRecording, RigTruth, Station, View
 
 

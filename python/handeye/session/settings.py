@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from enum import StrEnum
 from typing import Any, cast
 
@@ -100,6 +100,7 @@ class Configuration:
     """
 
     robot: str | None
+    _: KW_ONLY
     driver: str = SIMULATED
     images: str = SIMULATED
     mounting: Mounting = Mounting.EYE_IN_HAND

@@ -14,7 +14,7 @@ lost. What the recording holds and the journal lacks is never deleted: such a se
 import os
 import stat
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, Self, TypeVar
@@ -25,6 +25,7 @@ from handeye.datasets.recording_format import ViewsApart, read_views_apart
 from handeye.datasets.recording_writing import RecordingFolder, write_empty_recording
 from handeye.datasets.writing import new_folder, remove_partials, replace_file, write_file
 from handeye.errors import InputError, OutputError
+from handeye.session.comparing import check_same, is_current, same_view
 from handeye.session.entry import Entry, views_of
 from handeye.session.journal import (
     JOURNAL_FILE,
@@ -35,10 +36,9 @@ from handeye.session.journal import (
     read_settings,
 )
 from handeye.session.self_calibration import SelfCalibration, same_camera
-from handeye.types import Recording, Station, Truth, View
+from handeye.types import Recording, Truth, View
 
 RECORDING_FILE = "recording.toml"
-K = TypeVar("K", View, Station)
 S = TypeVar("S", bound="Store")
 
 
@@ -306,75 +306,6 @@ def _with_camera_of(
     if not same_camera(found.recording.camera, then):
         return found.recording
     return replace(found.recording, camera=base.camera)
-
-
-def is_current(found: Mapping[str, K | InputError], expected: Sequence[K]) -> bool:
-    """Tell whether a recording holds whole what the journal has."""
-    return list(found) == [one.name for one in expected] and not any(
-        isinstance(one, InputError) for one in found.values()
-    )
-
-
-def check_same(
-    path: Path,
-    same_header: bool,
-    found: Mapping[str, K | InputError],
-    taken: Sequence[K],
-    same: Callable[[K, K], bool],
-) -> None:
-    """Refuse a recording that holds what the journal lacks.
-
-    Parameters
-    ----------
-    path
-        Its file.
-    same_header
-        Whether all but its views is what the session began with.
-    found
-        Its views or stations by name, or what is wrong with them.
-    taken
-        Those of the journal.
-    same
-        Tells whether one is that of the journal.
-
-    Raises
-    ------
-    InputError
-        It does.
-    """
-    known = {one.name: one for one in taken}
-    more = [name for name in found if name not in known]
-    if more:
-        raise InputError(
-            f"{path}: holds {', '.join(more[:10])}, which no attempt in the journal took: it was cut "
-            f"after {len(taken)} views",
-            code="journal_cut",
-            hint=f"restore {JOURNAL_FILE} from a copy; handeye solve uses the recording as it is",
-        )
-    if not same_header:
-        raise InputError(
-            f"{path}: name, source, mounting, camera or target are not those that the session began with",
-            code="edited",
-            hint="undo the change, or begin a new session",
-        )
-    for name, one in found.items():
-        if isinstance(one, InputError):
-            if one.code != "missing_file":
-                raise one
-        elif not same(one, known[name]):
-            raise InputError(
-                f"{path}: view {name} is not as in the journal: its row or its corners were edited",
-                code="edited",
-                hint="undo it, or delete the file of its corners: it is written again from the journal",
-            )
-
-
-def same_view(view: View, known: View) -> bool:
-    """Tell whether a view is that of the journal, but for an image that may be lost."""
-    one, other = view.to_dict(), known.to_dict()
-    if one.get("image") is None:  # lost, and not kept in the journal
-        other.pop("image", None)
-    return one == other
 
 
 def _locked(path: Path) -> IO[bytes]:

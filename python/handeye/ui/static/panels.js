@@ -5,7 +5,7 @@ import { send } from "./app.js";
 const $ = (id) => document.getElementById(id);
 const figures = (v) => Number(v.toPrecision(2)).toString();
 const element = (tag, values = {}, ...children) => { const e = Object.assign(document.createElement(tag), values); e.append(...children); return e; };
-const PHASES = { start: "a small turn about where the arm stands", plan: "the view that teaches most", nudge: "half way back to where the target was seen", retry: "the same place again", hand: "where the arm stands" };
+const PHASES = { start: "a small turn about where the arm stands", plan: "the view that teaches most", nudge: "half way back to where the target was seen", back: "back the way it came", retry: "the same place again", hand: "where the arm stands" };
 let live = null, picked = null, tell = () => {}, drawn = 0;
 
 function state(d) {
