@@ -23,7 +23,6 @@ import numpy as np
 from handeye import _core
 from handeye.cameras.render import Appearance, BoardRenderer, clutter
 from handeye.datasets import ImageSet, load
-from handeye.datasets.images import read_image
 from handeye.detection import Detection, NotFound, Prediction, calibrate_camera, detect, relabeled
 from handeye.detection.registration import printed
 from handeye.types import AprilGrid, ArucoGrid, Camera, Charuco, Chessboard, CircleGrid, Pose, Target
@@ -281,7 +280,7 @@ def public(root: Path) -> None:
         found: dict[str, Detection] = {}
         size = (0, 0)
         for shot in images.shots:
-            image = read_image(images.image_path(shot))
+            image = images.grey(shot)
             size = image.shape[::-1]
             printed(images.target)
             began = time.process_time()

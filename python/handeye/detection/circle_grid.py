@@ -36,6 +36,8 @@ LARGER = 1.5
 # A circle may be off from where those around it put it by this much, or this share of the way to the next;
 # one that something covers in part is off by more. Of the circles so many must be measured well.
 OFF_PX, OFF_SHARE, LEAST_MEASURED = 0.6, 0.02, 0.6
+# Its area may differ by this share from what those of the others tell, or by so many times what is usual.
+SIZE_OFF, SIZE_OFF_SPREADS, FEWEST_FOR_SIZES = 0.015, 5.0, 16
 # A circle further from where it was expected, as a share of the root of its area, or of another size, is
 # something else.
 ASTRAY_SHARE, AREA_RATIO = 0.3, 1.5
@@ -78,7 +80,7 @@ def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | Non
     there[ids] = good
     if not _is_certain(target, there):
         return None
-    good[good] = _fit_others(target.points[ids[good], :2], found.centres[good])
+    good[good] = _fit_others(target, ids[good], found.take(np.flatnonzero(good)))
     if target.marked is not None:
         spots = np.full(target.point_count, -1)
         spots[ids[good]] = np.flatnonzero(good)
@@ -88,12 +90,29 @@ def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | Non
     return ordered(target, ids[good], kept.centres, sigmas_px(image, kept))
 
 
-def _fit_others(plane: FloatArray, pixels: FloatArray) -> NDArray[np.bool_]:
-    """Tell which circles (N,), at (N, 2) on the board and in the image, lie where those around put them."""
+def _fit_others(target: CircleGrid, ids: IndexArray, circles: Spots) -> NDArray[np.bool_]:
+    """Tell which circles (N,) of a target lie where those around put them and are as large as the others."""
+    plane, pixels = target.points[ids, :2], circles.centres
     away = np.linalg.norm(pixels[:, np.newaxis] - pixels, axis=2)
     np.fill_diagonal(away, np.inf)
     off = np.linalg.norm(from_neighbours(plane, pixels) - pixels, axis=1)
-    return np.asarray(off <= np.maximum(OFF_PX, OFF_SHARE * away.min(axis=1)), dtype=np.bool_)
+    fits = np.asarray(off <= np.maximum(OFF_PX, OFF_SHARE * away.min(axis=1)), dtype=np.bool_)
+    whole = _core.PlaneMap.fitted(plane, pixels) if len(ids) >= FEWEST_FOR_SIZES else None
+    if whole is not None:
+        # Of a small grid neighbours are far away, and a strong lens bends what lies between.
+        fits |= np.linalg.norm(whole.pixels(plane) - pixels, axis=1) <= OFF_PX / 2
+    # At the rim of the grid neighbours tell little, but a cover adds to the size or takes from it.
+    alike = np.flatnonzero(fits & (ids != (-1 if target.marked is None else target.marked)))
+    lens = _core.PlaneMap.fitted(plane[alike], pixels[alike]) if len(alike) >= FEWEST_FOR_SIZES else None
+    if lens is not None:
+        outlines = _outlines(pixels[alike], lens.steps(plane[alike], 1e-3 * np.ptp(plane)))
+        sizes = np.log(circles.areas[alike] / outlines.areas)
+        # What the map does not know of a strong lens is smooth.
+        x, y = ((plane[alike] - plane.mean(axis=0)) / np.ptp(plane)).T
+        columns = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+        sizes = np.abs(sizes - columns @ np.linalg.lstsq(columns, sizes, rcond=None)[0])
+        fits[alike] = sizes <= max(SIZE_OFF, SIZE_OFF_SPREADS * 1.4826 * float(np.median(sizes)))
+    return fits
 
 
 def _measure_first(image: Image, expected: Spots, which: int) -> None:
@@ -212,7 +231,7 @@ def _measured(
                 Reason.INCONSISTENT, "no circle where the marked one may be is larger than the others"
             )
     ids = np.flatnonzero((chosen >= 0) & good[chosen])
-    ids = ids[_fit_others(target.points[ids, :2], pixels[chosen[ids]])]
+    ids = ids[_fit_others(target, ids, Spots(pixels[chosen[ids]], shapes[chosen[ids]]))]
     if len(ids) < LEAST_MEASURED * target.point_count:
         return NotFound(Reason.INCOMPLETE, f"only {len(ids)} of {target.point_count} circles can be measured")
     kept = Spots(pixels[chosen[ids]], shapes[chosen[ids]])
