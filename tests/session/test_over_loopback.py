@@ -55,8 +55,8 @@ def camera(controller: MockUniversalRobot, monkeypatch: pytest.MonkeyPatch) -> C
 def asked(controller: MockUniversalRobot, **changes: object) -> Configuration:
     usual = Configuration(
         "ur5e",
-        f"ur:{controller.address}",
-        "mock",
+        driver=f"ur:{controller.address}",
+        images="mock",
         workspace_m=SPACE,
         speed_rad_s=3.0,
         timeouts=Timeouts(move_s=20, read_s=5, grab_s=5),
@@ -103,9 +103,9 @@ def test_a_calibration_survives_that_cables_are_pulled(
             time.sleep(0.002)
         camera.connected = False
 
+    wish = asked(controller, failures_in_a_row=2)
     thread = threading.Thread(target=sabotage)
     thread.start()
-    wish = asked(controller, failures_in_a_row=2)
     try:
         end, failures = driven(wish, cell, tmp_path / "s")
     finally:
