@@ -1,27 +1,22 @@
 """`handeye study`: the tables and figures of the paper, and those that go beyond it, on public data."""
 
-import importlib.metadata
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
 from handeye.cli.answer import Answer
 from handeye.cli.options import Common
-from handeye.cli.output import check_folder, write_figure, write_json
+from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
+from handeye.cli.study_options import Data, Trials, write_results
 from handeye.errors import InputError
-from handeye.types.calibration import ModelName
 from handeye.types.mounting import Mounting
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
 
-    from handeye.compute.parallel import Workers
-    from handeye.types import Recording
 
 study = App(
     name="study",
@@ -73,103 +68,11 @@ study.command(
 )
 
 
-@Parameter(name="*", group="Study")
-@dataclass(frozen=True)
-class Trials:
-    """What every study asks for."""
-
-    model: ModelName = ModelName.AUTO
-    """auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact."""
-    trials: Annotated[int | None, Parameter(show_default=False)] = None
-    """Random starts of each set, or simulated calibrations of each kind; 50, or 500."""
-    seed: int = 0
-    """Seed of everything random."""
-    workers: Annotated[int | None, Parameter(show_default=False)] = None
-    """Processes; all processors by default. The results do not depend on it."""
-    scheduler: Annotated[str | None, Parameter(show_default=False)] = None
-    """Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786."""
-    checkpoint: Path | None = None
-    """Folder that keeps finished pieces: the same command goes on where it was broken off."""
-    output: Path | None = None
-    """Folder for the pictures and the JSON object; made if it does not exist."""
-
-    def count(self, usual: int) -> int:
-        """Return the number of trials, `usual` unless given.
-
-        Raises
-        ------
-        InputError
-            Fewer than one.
-        """
-        trials = usual if self.trials is None else self.trials
-        if trials < 1:
-            raise InputError(f"{trials} trials, expected at least 1", code="out_of_range")
-        return trials
-
-    @property
-    def processes(self) -> int:
-        """Number of processes."""
-        if self.workers is not None:
-            return self.workers
-        from joblib import cpu_count  # noqa: PLC0415  # pyright: ignore[reportUnknownVariableType]
-
-        count: int = cpu_count()
-        return count
-
-    @property
-    def crew(self) -> "Workers":
-        """Who does the work, and what keeps it."""
-        workers: Workers = self.processes
-        if self.scheduler is not None:
-            from handeye.compute.cluster import Cluster  # noqa: PLC0415 - rarely wanted
-
-            workers = Cluster(self.scheduler)
-        if self.checkpoint is not None:
-            from handeye.compute.checkpoint import Checkpoint  # noqa: PLC0415 - rarely wanted
-
-            workers = Checkpoint(self.checkpoint, workers)
-        return workers
-
-
-@Parameter(name="*", group="Data")
-@dataclass(frozen=True)
-class Data:
-    """Where the sets are."""
-
-    data: Path | None = None
-    """Folder that holds the sets, or holds rwhe-calib; by default what HANDEYE_DATA names."""
-    sets: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = ()
-    """Names of the sets, if not the usual ones of the study: any folders that `handeye solve` reads."""
-    no_cache: bool = False
-    """Look for the target again, and remember nothing."""
-
-    def load(self, usual: Sequence[str], workers: int) -> "list[Recording]":
-        """Return the recordings, `usual` ones unless named.
-
-        Raises
-        ------
-        InputError, DetectionError, DegenerateError, SolveError
-            As `handeye.studies.data.load_sets`.
-        """
-        from handeye.studies.data import cache_folder, data_folder, load_sets  # noqa: PLC0415
-
-        names = self.sets or tuple(usual)
-        folder = data_folder(self.data)
-        with progress("Reading the sets") as advance:
-            return load_sets(
-                folder,
-                names,
-                workers=workers,
-                cache=None if self.no_cache else cache_folder(),
-                progress=advance,
-            )
-
-
 @study.command
 def table1(
     *,
-    data: Data = Data(),
-    trials: Trials = Trials(),
+    data: Data = Data(),  # noqa: B008
+    trials: Trials = Trials(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Reproduce the paper's table I: errors against truth on simulated sets, three policies.
@@ -217,8 +120,8 @@ def table1(
 @study.command
 def curves(
     *,
-    data: Data = Data(),
-    trials: Trials = Trials(),
+    data: Data = Data(),  # noqa: B008
+    trials: Trials = Trials(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Draw the paper's curves against the number of added views, and what gains are worth.
@@ -270,8 +173,8 @@ def curves(
 @study.command
 def holdout(
     *,
-    data: Data = Data(),
-    trials: Trials = Trials(),
+    data: Data = Data(),  # noqa: B008
+    trials: Trials = Trials(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Measure on real sets: errors on a third of the views held out, and how well halves agree.
@@ -323,8 +226,8 @@ def holdout(
 @study.command
 def injected(
     *,
-    data: Data = Data(),
-    trials: Trials = Trials(),
+    data: Data = Data(),  # noqa: B008
+    trials: Trials = Trials(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Add noise to the robot poses of a simulated set, its levels not told, and compare with the truth.
@@ -369,7 +272,7 @@ def injected(
 def coverage(
     *,
     mounting: Mounting = Mounting.EYE_IN_HAND,
-    trials: Trials = Trials(),
+    trials: Trials = Trials(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Count how often the 95 % region of the hand-eye holds the truth, for each kind of error.
@@ -418,8 +321,8 @@ def coverage(
 def mistakes(
     *,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = (),
-    data: Data = Data(),
-    trials: Trials = Trials(),
+    data: Data = Data(),  # noqa: B008
+    trials: Trials = Trials(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Plant one mistake each in recordings, and count how many are named, and what they cost.
@@ -466,29 +369,3 @@ def mistakes(
         tables.show_written(console, written)
 
     return Answer(document, show)
-
-
-def versions() -> dict[str, str]:
-    """Return the versions that the numbers of a study come from."""
-    names = ("handeye", "numpy", "opencv-contrib-python-headless")
-    return {name: importlib.metadata.version(name) for name in names}
-
-
-def write_results(
-    folder: Path | None,
-    name: str,
-    document: Mapping[str, Any],
-    pictures: "Callable[[], Iterable[tuple[str, Figure]]]",
-) -> list[Path]:
-    """Write the numbers of a study, with versions, and its pictures into a folder, if one is asked for.
-
-    Returns the files.
-    """
-    if folder is None:
-        return []
-    written = [folder / f"{name}.json"]
-    write_json(written[0], {**document, "versions": versions()})
-    for picture, figure in pictures():
-        written.append(folder / f"{picture}.png")
-        write_figure(written[-1], figure)
-    return written

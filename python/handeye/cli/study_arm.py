@@ -1,15 +1,14 @@
 """`handeye study arm`: whether an arm that was put right is nearer to the truth where nobody looked."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
-from handeye.cli.options import Common, Seed
+from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import Trials, write_results
+from handeye.cli.study_options import Effort, write_results
+from handeye.studies.arm import ArmStudy, study_arm
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,14 +16,10 @@ if TYPE_CHECKING:
 
 def arm(
     *,
-    arms: int = 50,
-    views: int = 30,
-    postures: int = 1000,
-    seed: Seed = 0,
-    workers: Annotated[int | None, Parameter(show_default=False)] = None,
-    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
-    checkpoint: Path | None = None,
-    output: Path | None = None,
+    arms: int = ArmStudy.arms,
+    views: int = ArmStudy.views,
+    postures: int = ArmStudy.postures,
+    effort: Effort = Effort(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Compare arms with wrong links, as described and as put right, with the truth at unseen postures.
@@ -40,27 +35,15 @@ def arm(
         Views of each.
     postures
         Unseen postures of each.
-    seed
-        Seed of everything random.
-    workers
-        Processes; all processors by default. The results do not depend on it.
-    scheduler
-        Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786.
-    checkpoint
-        Folder that keeps finished pieces: the same command goes on where it was broken off.
-    output
-        Folder for the JSON object; made if it does not exist.
     """
-    from handeye.studies.arm import ArmStudy, study_arm  # noqa: PLC0415
-
-    check_folder(output)
+    check_folder(effort.output)
     with progress("Putting arms right") as advance:
         document = study_arm(
-            ArmStudy(arms=arms, views=views, postures=postures, seed=seed),
-            workers=Trials(workers=workers, scheduler=scheduler, checkpoint=checkpoint).crew,
+            ArmStudy(arms=arms, views=views, postures=postures, seed=effort.seed),
+            workers=effort.crew,
             progress=advance,
         )
-    written = write_results(output, "arm", document, lambda: ())
+    written = write_results(effort.output, "arm", document, lambda: ())
     return Answer(document, lambda console: _show(console, document, written))
 
 

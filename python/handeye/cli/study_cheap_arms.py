@@ -1,15 +1,14 @@
 """`handeye study cheap-arms`: arms of hobby servos, and what nobody reaches with them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
-from handeye.cli.options import Common, Seed
+from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import Trials, write_results
+from handeye.cli.study_options import Effort, write_results
+from handeye.studies.cheap_arm import CheapArmStudy, study_cheap_arms
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,14 +16,10 @@ if TYPE_CHECKING:
 
 def cheap_arms(
     *,
-    cells: int = 200,
-    views: int = 20,
-    play: bool = False,
-    seed: Seed = 0,
-    workers: Annotated[int | None, Parameter(show_default=False)] = None,
-    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
-    checkpoint: Path | None = None,
-    output: Path | None = None,
+    cells: int = CheapArmStudy.cells,
+    views: int = CheapArmStudy.views,
+    play: bool = CheapArmStudy.play,
+    effort: Effort = Effort(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Count how often the region holds with arms of hobby servos, and how early a request is refused.
@@ -40,27 +35,15 @@ def cheap_arms(
         Views of each.
     play
         Estimate the play of the joints of arms that are described.
-    seed
-        Seed of everything random.
-    workers
-        Processes; all processors by default. The results do not depend on it.
-    scheduler
-        Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786.
-    checkpoint
-        Folder that keeps finished pieces: the same command goes on where it was broken off.
-    output
-        Folder for the JSON object; made if it does not exist.
     """
-    from handeye.studies.cheap_arm import CheapArmStudy, study_cheap_arms  # noqa: PLC0415
-
-    check_folder(output)
+    check_folder(effort.output)
     with progress("Making up arms") as advance:
         document = study_cheap_arms(
-            CheapArmStudy(cells, views, play, seed),
-            workers=Trials(workers=workers, scheduler=scheduler, checkpoint=checkpoint).crew,
+            CheapArmStudy(cells, views, play, effort.seed),
+            workers=effort.crew,
             progress=advance,
         )
-    written = write_results(output, "cheap_arms", document, lambda: ())
+    written = write_results(effort.output, "cheap_arms", document, lambda: ())
     return Answer(document, lambda console: _show(console, document, written))
 
 

@@ -7,7 +7,7 @@ from handeye.cli.answer import Answer
 from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import Trials, write_results
+from handeye.cli.study_options import Trials, write_results
 
 # Below this an error is rounding, mm and degrees.
 NOTHING = 1e-6

@@ -1,15 +1,14 @@
 """`handeye study probing`: whether touching finds a board of another size."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
-from handeye.cli.options import Common, Seed
+from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import Trials, write_results
+from handeye.cli.study_options import Effort, write_results
+from handeye.studies.probing import ProbingStudy, study_probing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,13 +16,9 @@ if TYPE_CHECKING:
 
 def probing(
     *,
-    cells: int = 100,
-    board_percent: float = 0.5,
-    seed: Seed = 0,
-    workers: Annotated[int | None, Parameter(show_default=False)] = None,
-    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
-    checkpoint: Path | None = None,
-    output: Path | None = None,
+    cells: int = ProbingStudy.cells,
+    board_percent: float = 100 * ProbingStudy.board_scale,
+    effort: Effort = Effort(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Count what finds a board that is larger than stated: halves, residuals, or three touched corners.
@@ -37,27 +32,15 @@ def probing(
         How many.
     board_percent
         By how much their boards are larger than stated; 0 counts false alarms.
-    seed
-        Seed of everything random.
-    workers
-        Processes; all processors by default. The results do not depend on it.
-    scheduler
-        Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786.
-    checkpoint
-        Folder that keeps finished pieces: the same command goes on where it was broken off.
-    output
-        Folder for the JSON object; made if it does not exist.
     """
-    from handeye.studies.probing import ProbingStudy, study_probing  # noqa: PLC0415
-
-    check_folder(output)
+    check_folder(effort.output)
     with progress("Touching boards") as advance:
         document = study_probing(
-            ProbingStudy(cells, board_percent / 100, seed),
-            workers=Trials(workers=workers, scheduler=scheduler, checkpoint=checkpoint).crew,
+            ProbingStudy(cells, board_percent / 100, effort.seed),
+            workers=effort.crew,
             progress=advance,
         )
-    written = write_results(output, "probing", document, lambda: ())
+    written = write_results(effort.output, "probing", document, lambda: ())
     return Answer(document, lambda console: _show(console, document, written))
 
 

@@ -11,7 +11,7 @@ from handeye.cli.answer import Answer
 from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import Data, Trials, versions, write_results
+from handeye.cli.study_options import Data, Trials, versions, write_results
 from handeye.errors import InputError
 
 if TYPE_CHECKING:

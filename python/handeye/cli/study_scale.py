@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from handeye.cli.answer import Answer
 from handeye.cli.options import Common, Seed
 from handeye.cli.output import check_folder
-from handeye.cli.study import Trials, write_results
+from handeye.cli.study_options import Effort, write_results
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -45,7 +45,7 @@ def scale(
     from handeye.studies.scale import study_scale  # noqa: PLC0415 - help need not wait for it
 
     check_folder(output)
-    processes = Trials(workers=workers).processes
+    processes = Effort(workers=workers).processes
     document = study_scale(trials=trials, processes=processes, cluster=not no_cluster, seed=seed).to_dict()
     written = write_results(output, "scale", document, lambda: ())
     return Answer(document, lambda console: _show(console, document, written))

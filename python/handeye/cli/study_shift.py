@@ -1,15 +1,14 @@
 """`handeye study shift`: whether a check finds what moved, and names it."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
-from handeye.cli.options import Common, Seed
+from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import Trials, write_results
+from handeye.cli.study_options import Effort, write_results
+from handeye.studies.shift import ShiftStudy, study_shift
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,15 +16,11 @@ if TYPE_CHECKING:
 
 def shift(
     *,
-    trials: int = 100,
-    sigmas: float = 3.0,
-    views: int = 2,
-    described: bool = True,
-    seed: Seed = 0,
-    workers: Annotated[int | None, Parameter(show_default=False)] = None,
-    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
-    checkpoint: Path | None = None,
-    output: Path | None = None,
+    trials: int = ShiftStudy.trials,
+    sigmas: float = ShiftStudy.sigmas,
+    views: int = ShiftStudy.views,
+    described: bool = ShiftStudy.arm_known,
+    effort: Effort = Effort(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Count how often a check alarms, and names what moved.
@@ -43,27 +38,15 @@ def shift(
         Planned views of a check.
     described
         Whether the arm is described.
-    seed
-        Seed of everything random.
-    workers
-        Processes; all processors by default. The results do not depend on it.
-    scheduler
-        Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786.
-    checkpoint
-        Folder that keeps finished pieces: the same command goes on where it was broken off.
-    output
-        Folder for the JSON object; made if it does not exist.
     """
-    from handeye.studies.shift import ShiftStudy, study_shift  # noqa: PLC0415
-
-    check_folder(output)
+    check_folder(effort.output)
     with progress("Checking") as advance:
         document = study_shift(
-            ShiftStudy(trials, sigmas, views, described, seed),
-            workers=Trials(workers=workers, scheduler=scheduler, checkpoint=checkpoint).crew,
+            ShiftStudy(trials, sigmas, views, described, effort.seed),
+            workers=effort.crew,
             progress=advance,
         )
-    written = write_results(output, "shift", document, lambda: ())
+    written = write_results(effort.output, "shift", document, lambda: ())
     return Answer(document, lambda console: _show(console, document, written))
 
 

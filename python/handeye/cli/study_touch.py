@@ -1,16 +1,15 @@
 """`handeye study touch`: whether the tool lands where it is said to."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
-from handeye.cli.options import Common, Seed
+from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import Trials, write_results
+from handeye.cli.study_options import Effort, write_results
 from handeye.cli.work import check_touch
+from handeye.studies.touch import TouchStudy, study_touch
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,15 +17,11 @@ if TYPE_CHECKING:
 
 def touch(
     *,
-    cells: int = 50,
-    touches: int = 100,
+    cells: int = TouchStudy.cells,
+    touches: int = TouchStudy.touches,
     touch_mm: float | None = None,
-    views: int = 10,
-    seed: Seed = 0,
-    workers: Annotated[int | None, Parameter(show_default=False)] = None,
-    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
-    checkpoint: Path | None = None,
-    output: Path | None = None,
+    views: int = TouchStudy.views,
+    effort: Effort = Effort(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Count how often the tool lands within the stated touch error, at places where nobody looked before.
@@ -45,28 +40,16 @@ def touch(
         Also choose views one by one out of 40, by entropy and by touch error, and stop at this touch error.
     views
         Views after which entropy and touch error are compared.
-    seed
-        Seed of everything random.
-    workers
-        Processes; all processors by default. The results do not depend on it.
-    scheduler
-        Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786.
-    checkpoint
-        Folder that keeps finished pieces: the same command goes on where it was broken off.
-    output
-        Folder for the JSON object; made if it does not exist.
     """
-    from handeye.studies.touch import TouchStudy, study_touch  # noqa: PLC0415
-
     check_touch(touch_mm)
-    check_folder(output)
+    check_folder(effort.output)
     with progress("Seeing and touching") as advance:
         document = study_touch(
-            TouchStudy(cells=cells, touches=touches, views=views, asked_mm=touch_mm, seed=seed),
-            workers=Trials(workers=workers, scheduler=scheduler, checkpoint=checkpoint).crew,
+            TouchStudy(cells=cells, touches=touches, views=views, asked_mm=touch_mm, seed=effort.seed),
+            workers=effort.crew,
             progress=advance,
         )
-    written = write_results(output, "touch", document, lambda: ())
+    written = write_results(effort.output, "touch", document, lambda: ())
     return Answer(document, lambda console: _show(console, document, written))
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from handeye.cli.answer import Answer
-from handeye.cli.options import Common, Seed
+from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
-from handeye.cli.study import Trials, write_results
+from handeye.cli.study_options import Effort, write_results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,11 +31,7 @@ def twin(
     trials: int = 10,
     models: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = (),
     render: bool = False,
-    seed: Seed = 0,
-    workers: Annotated[int | None, Parameter(show_default=False)] = None,
-    scheduler: Annotated[str | None, Parameter(show_default=False)] = None,
-    checkpoint: Path | None = None,
-    output: Path | None = None,
+    effort: Effort = Effort(),  # noqa: B008
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Repeat the paper's study on real data (table II) on a twin of its cell, where the truth is known.
@@ -55,29 +51,19 @@ def twin(
         Some of paper, auto and auto_with_arm (the default where the arm is described), if not all.
     render
         Render every picture and look for the circles in it, instead of projecting them with noise.
-    seed
-        Seed of everything random.
-    workers
-        Processes; all processors by default. The results do not depend on it.
-    scheduler
-        Address of a Dask scheduler whose workers do the work, such as tcp://127.0.0.1:8786.
-    checkpoint
-        Folder that keeps finished pieces: the same command goes on where it was broken off.
-    output
-        Folder for the pictures and the JSON object; made if it does not exist.
     """
     from handeye.simulation.twin import TwinOptions  # noqa: PLC0415
     from handeye.studies.twin import MODELS, study_twin  # noqa: PLC0415 - help need not wait for it
 
-    check_folder(output)
+    check_folder(effort.output)
     with progress("Calibrating twins from random starts") as advance:
         result = study_twin(
             models=models or MODELS,
             sets=sets,
             trials=trials,
             options=TwinOptions(rendered=render),
-            seed=seed,
-            workers=Trials(workers=workers, scheduler=scheduler, checkpoint=checkpoint).crew,
+            seed=effort.seed,
+            workers=effort.crew,
             progress=advance,
         )
 
@@ -93,7 +79,7 @@ def twin(
                 yield "twin_scatter", scatter_figure(curves)
 
     document = result.to_dict()
-    written = write_results(output, "twin", document, pictures)
+    written = write_results(effort.output, "twin", document, pictures)
     return Answer(document, lambda console: _show(console, document, written))
 
 
