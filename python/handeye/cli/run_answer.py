@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -21,25 +21,38 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+Found = TypeVar("Found")
+
+
+def found(calibration: Found | None, why: tuple[EndReason, str], folder: Path, taken: str) -> Found:
+    """Return what a run has found, where it ended for a reason that leaves an answer.
+
+    Raises
+    ------
+    HandeyeError
+        There is none: too many attempts failed, no target was seen, or what was taken does not determine it.
+    """
+    reason, sentence = why
+    hint = f"handeye run --resume --session {folder} goes on"
+    if reason in {EndReason.TOO_MANY_FAILURES, EndReason.ROBOT_HANGS}:
+        raise DeviceError(sentence, code=reason, hint=hint)
+    if reason is EndReason.NO_START:
+        raise DetectionError(sentence, code=reason, hint=hint)
+    if calibration is None:
+        raise HandeyeError(f"{sentence}; the {taken} do not determine the answer", code=reason, hint=hint)
+    return calibration
+
+
 def run_answer(folder: Path, configuration: Configuration, prepared: Prepared, end: End) -> Answer:
     """Return the answer of a run that has one.
 
     Raises
     ------
     HandeyeError
-        It has none: too many attempts failed, the target was not seen, or the views do not determine it.
+        As `found`.
     """
-    hint = f"handeye run --resume --session {folder} goes on"
     report = None if end.calibration is None else _report(folder, configuration.model)
-    if end.reason in {EndReason.TOO_MANY_FAILURES, EndReason.ROBOT_HANGS}:
-        raise DeviceError(end.sentence, code=end.reason, hint=hint)
-    if end.reason is EndReason.NO_START:
-        raise DetectionError(end.sentence, code=end.reason, hint=hint)
-    calibration = end.calibration
-    if calibration is None:
-        raise HandeyeError(
-            f"{end.sentence}; the views do not determine the answer", code=end.reason, hint=hint
-        )
+    calibration = found(end.calibration, (end.reason, end.sentence), folder, "views")
     error: dict[str, float] | None = None
     if prepared.truth is not None and prepared.truth.X is not None:
         off = (calibration.X @ prepared.truth.X.inverse()).log()

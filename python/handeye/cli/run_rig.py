@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
-from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.cli.run_answer import found
 from handeye.estimation.confidence import Within
 from handeye.robots.protocol import Goal
 from handeye.session.deciding import EndReason
@@ -93,16 +93,7 @@ def _run(session: RigSession, store: RigStore, prepared: RigPrepared) -> tuple[R
 
 
 def _answer(folder: Path, prepared: RigPrepared, end: RigEnd) -> Answer:
-    hint = f"handeye run --resume --session {folder} goes on"
-    if end.reason in {EndReason.TOO_MANY_FAILURES, EndReason.ROBOT_HANGS}:
-        raise DeviceError(end.sentence, code=end.reason, hint=hint)
-    if end.reason is EndReason.NO_START:
-        raise DetectionError(end.sentence, code=end.reason, hint=hint)
-    calibration = end.calibration
-    if calibration is None:
-        raise HandeyeError(
-            f"{end.sentence}; the stations do not determine the answer", code=end.reason, hint=hint
-        )
+    calibration = found(end.calibration, (end.reason, end.sentence), folder, "stations")
     run = judged(prepared, end)
 
     def told(name: str, within: Within) -> dict[str, Any]:
