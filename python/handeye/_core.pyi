@@ -12,6 +12,11 @@ from typing import TypeAlias
 from numpy import bool_, float32, float64, int64, uint8
 from numpy.typing import ArrayLike, NDArray
 
+# Calls
+
+def panic(message: str) -> None:
+    """Fail as a mistake in the core would: a `RuntimeError` with the message."""
+
 # Rigid transforms
 
 def se3_exp(xi: ArrayLike) -> NDArray[float64]:

@@ -1,4 +1,4 @@
-"""Calls into the core: wrong ones are refused, and Ctrl-C is heard while it works."""
+"""Calls into the core: wrong ones are refused, panics are ordinary exceptions, Ctrl-C is heard while it works."""
 
 import os
 import signal
@@ -36,6 +36,12 @@ def test_work_that_takes_an_hour_can_be_interrupted(work: Callable[[], None]) ->
             work()
     finally:
         timer.cancel()
+
+
+def test_a_panic_is_an_ordinary_exception() -> None:
+    for _ in range(2):
+        with pytest.raises(RuntimeError, match="the core failed: no such number"):
+            _core.panic("no such number")
 
 
 def test_a_start_has_a_transform_for_each_camera_and_target() -> None:

@@ -56,3 +56,13 @@ fn is_interrupted() -> bool {
         }
     })
 }
+
+/// Fails as a mistake in the core would: how that reaches its callers can be tried.
+#[pyfunction]
+fn panic(py: Python<'_>, message: String) -> PyResult<()> {
+    py.core(|| std::panic::panic_any(message))
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(panic, module)?)
+}

@@ -26,6 +26,7 @@ mod problem;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     agreement::register(module)?;
+    call::register(module)?;
     alignment::register(module)?;
     camera::register(module)?;
     closed_form::register(module)?;
