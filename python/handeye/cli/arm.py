@@ -54,7 +54,7 @@ class ArmSource:
         if self.robot is not None and model is ModelName.PAPER:
             raise UsageError(
                 "the paper's model takes the robot as exact, and has no use for --robot",
-                hint="leave --robot or --model paper away",
+                hint="leave out --robot or --model paper",
             )
         arm = self.described()
         return None if arm is None else arm_kinematics(arm, views)

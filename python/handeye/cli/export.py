@@ -127,7 +127,7 @@ def export(
         answer = _solved(result, source, model or ModelName.AUTO, reduced=reduced)
     elif replace(source, only=None) != Source() or model is not None or reduced:
         raise UsageError(
-            "a result is solved already", hint="leave the options for folders away, or give the folder"
+            "a result is solved already", hint="leave out the options for folders, or give the folder"
         )
     else:
         answer = read_result(result, source.only)

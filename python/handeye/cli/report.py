@@ -105,7 +105,7 @@ def _gathered(
     if result.suffix.lower() == ".json" and not result.is_dir():
         if source != Source() or model is not None or reduced or is_drawn:
             raise UsageError(
-                "a result is solved already", hint="leave the options for folders away, or give the folder"
+                "a result is solved already", hint="leave out the options for folders, or give the folder"
             )
         return gather_result(result, command=shlex.join([*words, "--output", str(output)]), made=made)
     words += _source_words(source)

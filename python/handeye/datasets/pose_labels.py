@@ -124,7 +124,7 @@ def _pose_columns(labels: Sequence[str], left: Sequence[int]) -> list[int]:
             f"columns {', '.join(labels)[:200]}: expected x, y, z and the rotation (rx, ry, rz; a, b, c; "
             "qx, qy, qz, qw; ...), or a matrix of 12 or 16",
             code="invalid_field",
-            hint="name the columns so, or leave the header away",
+            hint="name the columns so, or leave out the header",
         )
     return list(left)
 

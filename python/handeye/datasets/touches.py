@@ -9,7 +9,7 @@
     [[tip]]
     name = "tool"
     on = "flange"               # or "base": a fixed point in the cell
-    at_mm = [0.0, 0.0, 150.0]   # where it is believed to be; leave both away where nobody knows
+    at_mm = [0.0, 0.0, 150.0]   # where it is believed to be; leave both out if it is not known
     sigma_mm = 0.5              # and how well; 0 for exact
 
     [[touch]]
@@ -92,7 +92,7 @@ def _tip(tip: _TipDocument) -> Tip:
         raise InputError(
             f"tip {tip.name[:80]}: at_mm and sigma_mm go together",
             code="invalid_field",
-            hint="say where it is believed to be and how well (0 for exact), or leave both away",
+            hint="say where it is believed to be and how well (0 for exact), or leave both out",
         )
     x, y, z = (value / MM_PER_M for value in tip.at_mm)
     return Tip(tip.on, (x, y, z), tip.sigma_mm / MM_PER_M)

@@ -140,7 +140,7 @@ def arm_kinematics(arm: Arm, views: Sequence[View]) -> ArmKinematics:
         raise InputError(
             "no view has joint positions, which the arm's kinematics need",
             code="no_joints",
-            hint="record the joint positions with every view, or leave the arm away",
+            hint="record the joint positions with every view, or leave out the arm",
         )
     for view in known:
         if len(view.joints_rad or ()) != len(arm):

@@ -148,6 +148,6 @@ class Probing:
                 raise InputError(
                     f"touch {number}: {len(touch.joints_rad or ())} joint positions, the arm has {count}",
                     code="no_joints",
-                    hint="write down the joints at every touch, or leave --robot away",
+                    hint="write down the joints at every touch, or leave out --robot",
                 )
         return np.array([touch.joints_rad for touch in self.touches], dtype=float)
