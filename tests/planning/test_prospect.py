@@ -42,7 +42,10 @@ def test_what_is_far_out_of_reach_is_refused_within_six_views(measurements: Meas
             assert stop.reason is StopReason.OUT_OF_REACH
             assert "this arm cannot reach" in stop.sentence
             assert f"with {MANY_VIEWS} views it would come to" in stop.sentence
-        assert OutOfReach(then.translation_mm, then.rotation_deg).verdict(state) is None
+        # Forecasts are rough: what they miss by two is not refused.
+        for share in (1, 2):
+            asked = OutOfReach(then.translation_mm / share, then.rotation_deg / share)
+            assert asked.verdict(state) is None
 
 
 def test_a_wish_refuses_unless_it_is_told_to_go_on() -> None:
