@@ -29,6 +29,8 @@ def selection() -> None:
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal to itself")
 @pytest.mark.parametrize("work", [inverse_kinematics, selection])
 def test_work_that_takes_an_hour_can_be_interrupted(work: Callable[[], None]) -> None:
+    # A shell's background jobs are started deaf to Ctrl-C.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     try:
@@ -36,6 +38,7 @@ def test_work_that_takes_an_hour_can_be_interrupted(work: Callable[[], None]) ->
             work()
     finally:
         timer.cancel()
+        signal.signal(signal.SIGINT, before)
 
 
 def test_a_panic_is_an_ordinary_exception() -> None:
