@@ -12,14 +12,13 @@ from handeye.robots.urdf import (
     attribute_of,
     edges_of,
     links_of,
-    number_of,
     path_of,
     placed,
     read_file,
     tree_of,
     triple,
-    unusable,
 )
+from handeye.robots.urdf_numbers import number_of, unusable
 from handeye.robots.xml_tree import Element, read_xml
 from handeye.types.pose import Pose
 
