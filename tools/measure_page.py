@@ -144,7 +144,7 @@ def spent(observer: Observer, folder: Path) -> float:
     while not isinstance(step, End):
         step = session.next()
         if isinstance(observer, Dashboard):
-            observer.decided(step, session.views, session.rejected)
+            observer.decided(step, session)
         if isinstance(step, Step):
             session.take(step)
     seconds = time.process_time() - began

@@ -244,7 +244,8 @@ def look(
     timings["grab"] = timings.get("grab", 0.0) + time.monotonic() - started
     started = time.monotonic()
     found = _look(eye, frame, digests, predicted)
-    cell.observer.looked(label, frame.image, None if isinstance(found, Missed) else found[0])
+    seen = None if isinstance(found, Missed) else found[0]
+    cell.observer.looked(label, frame.image, seen, eye.name)
     timings["detect"] = timings.get("detect", 0.0) + time.monotonic() - started
     if isinstance(found, Missed):
         return found

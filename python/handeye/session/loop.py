@@ -87,6 +87,11 @@ class Session(Stepping[Situation, End]):
         return tuple(self._usable())
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the views that count, in the order in which they were taken."""
+        return tuple(view.name for view in self._usable())
+
+    @property
     def rejected(self) -> dict[str, str]:
         """Views whose points are no picture of the target, and why."""
         return dict(self._measurements.rejected)
@@ -114,7 +119,7 @@ class Session(Stepping[Situation, End]):
         OutputError
             The disk does not take it.
         """
-        if name not in {view.name for view in self.views}:
+        if name not in self.names:
             raise InputError(f"view {name[:60]}: no view of this session", code="unknown_view")
         return self._withdraw(name, why)
 

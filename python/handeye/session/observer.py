@@ -19,8 +19,13 @@ class Observer:
     def goes(self, goal: Goal) -> None:
         """Tell where the arm is sent now."""
 
-    def looked(self, label: str, image: Grey | None, detection: Detection | None) -> None:
-        """Tell what a picture showed; None for the points where the target was not found."""
+    def looked(
+        self, label: str, image: Grey | None, detection: Detection | None, names: tuple[str, str]
+    ) -> None:
+        """Tell what a picture showed, and of which camera and target it is.
+
+        The points are None where the target was not found.
+        """
 
     def taken(self, entry: Entry, estimate: Estimate | None) -> None:
         """Tell what an attempt brought, and what was believed before it."""
