@@ -132,14 +132,19 @@ class Crowded(Dashboard):
         super()._told(step, replace(shown, views=crowd.views, considered=crowd.considered), count)
 
 
-def session_seconds(folder: Path, dashboard: Dashboard | None) -> list[float]:
-    """Run a session as `drive` does; return how long each step of the loop took, by the clock on the wall."""
+def session_seconds(folder: Path, dashboard: Dashboard | None) -> tuple[list[float], float]:
+    """Run a session as `drive` does.
+
+    Return how long each step of the loop took by the clock on the wall, and the processor time of all.
+    """
     observer = Observer() if dashboard is None else dashboard
-    prepared = prepare(replace(QUICK, most_views=STEPS), observer=observer)
+    asked = replace(QUICK, most_views=STEPS, simulation=Simulation())
+    prepared = prepare(asked, observer=observer)
     session, store = begin(prepared, folder / "s")
     if dashboard is not None:
         dashboard.prepare(prepared, store)
     seconds: list[float] = []
+    spent = time.process_time()
     step: Step | End | None = None
     while not isinstance(step, End):
         began = time.perf_counter()
@@ -150,8 +155,9 @@ def session_seconds(folder: Path, dashboard: Dashboard | None) -> list[float]:
         if isinstance(step, Step):
             session.take(step)
         seconds.append(time.perf_counter() - began)
+    spent = time.process_time() - spent
     store.close()
-    return seconds
+    return seconds, spent
 
 
 def loop() -> None:
@@ -160,6 +166,7 @@ def loop() -> None:
     dashboard = Crowded(hub, crowded())
     server = Server(hub, pictures=dashboard)
     alone, watched = list[float](), list[float]()
+    processor = {False: 0.0, True: 0.0}
     with tempfile.TemporaryDirectory() as name, browser(Path(name)) as opened:
         for turn in range(TURNS):
             for times, shown in ((alone, None), (watched, dashboard)):
@@ -167,9 +174,10 @@ def loop() -> None:
                 with tempfile.TemporaryDirectory() as folder:
                     if window is not None:
                         window.page.wait_for_timeout(1000)
-                    found = session_seconds(Path(folder), shown)
+                    found, spent = session_seconds(Path(folder), shown)
                     if turn:  # the first has much to import
                         times.extend(found)
+                        processor[window is not None] += spent
                 if window is not None:
                     window.page.close()
     server.close()
@@ -177,6 +185,8 @@ def loop() -> None:
     told(f"with a page of {CANDIDATES} candidates and {VIEWS} views", watched)
     more = [sum(watched[i :: STEPS + 1]) / sum(alone[i :: STEPS + 1]) for i in range(STEPS + 1)]
     median = 100 * (statistics.median(more) - 1)
+    more_spent = 100 * (processor[True] / processor[False] - 1)
+    print(f"processor time of the program, server and all: {more_spent:.1f} % more")
     print(f"slower by {100 * (sum(watched) / sum(alone) - 1):.1f} %, the median step by {median:.1f} %")
 
 

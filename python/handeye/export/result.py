@@ -68,6 +68,11 @@ class Result:
         Number of views that the answer rests on.
     warnings
         What to know before it is used.
+
+    Examples
+    --------
+    >>> 1e3 * result.sigma_translation_m < 10.0  # mm
+    True
     """
 
     mounting: Mounting
@@ -125,6 +130,14 @@ def read_result(path: str | os.PathLike[str], camera: str | None = None) -> Resu
     ------
     InputError
         Not such a file; the message names file and field. Or a camera that is not in it.
+
+    Examples
+    --------
+    >>> import json
+    >>> from handeye.estimation import solve
+    >>> _ = Path("answer.json").write_text(json.dumps(solve(recording).to_dict()))
+    >>> read_result("answer.json").mounting.value
+    'eye_in_hand'
     """
     file = Path(path)
     document = read_document(_of_camera(read_result_json(file), camera, file), _ResultDocument, str(file))

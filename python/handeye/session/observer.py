@@ -11,6 +11,15 @@ class Observer:
     """Told of everything that a session does, on the thread of the session; this one ignores it.
 
     A subclass overrides what it wants to hear of. It must return soon: the arm waits meanwhile.
+
+    Examples
+    --------
+    >>> class Counting(Observer):
+    ...     attempts = 0
+    ...     def taken(self, entry, estimate):
+    ...         self.attempts += 1
+    >>> Counting().attempts
+    0
     """
 
     def stands(self, reading: Reading) -> None:

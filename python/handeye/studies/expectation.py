@@ -154,8 +154,8 @@ class _Told:
 def _made_of_stated(told: Sequence[_Told], number: int) -> FloatArray:
     """(2,) mean errors that were made over the mean of those stated, averaged around a number of views.
 
-    The mean of the cells' own ratios would be too large: what is stated is large in cells that are known badly
-    by chance, and in those the ratio is small.
+    The mean of the cells' own ratios would be too large: what is stated is large in cells that are known
+    badly by chance, and in those the ratio is small.
     """
     ratios: list[FloatArray] = []
     for near in range(number - _AROUND, number + _AROUND + 1):
