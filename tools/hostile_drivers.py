@@ -170,6 +170,8 @@ class Robot:
             beyond=bool(outside.any() or not np.isfinite(joints).all()),
             concurrent=self._at_once,
         )
+        if self._mode == "stuck":
+            time.sleep(1e6)
         fault = self._fault((*ERRORS, "lie", "lie_half", "half", "overshoot", "ignore", "refuse"))
         try:
             if fault in ERRORS:
@@ -295,6 +297,8 @@ class Camera:
     def grab(self, label: str) -> Any:  # noqa: ANN401
         """Take a picture, or bring something else."""
         self._count += 1
+        if self._mode == "stuck":
+            time.sleep(1e6)
         before, self._last = self._last, self._source.grab(label)
         calm = self._count < FIRST or bool(os.environ.get("HOSTILE_CALM"))
         fault = "" if calm else self._mode
