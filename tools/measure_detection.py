@@ -193,13 +193,16 @@ def quality(first: int, views: int) -> None:
         renderer = BoardRenderer(CAMERA, target, Appearance(supersampling=16))
         cells: list[str] = []
         everything: list[float] = []
+        drawn: dict[int, np.ndarray] = {}
         for look in LOOKS.values():
             ratios: list[float] = []
             sigmas: list[float] = []
             for view in range(first, first + views):
                 random = np.random.default_rng([23, view])
                 pose = posed(target, float(random.uniform(0.25, 0.7)), random)
-                found = detect(taken(renderer.image(pose), look, random), target)
+                if view not in drawn:
+                    drawn[view] = renderer.image(pose)
+                found = detect(taken(drawn[view], look, random), target)
                 if isinstance(found, NotFound) or found.sigmas_px is None:
                     continue
                 truth = projected(target, pose)
