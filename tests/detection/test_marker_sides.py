@@ -63,7 +63,8 @@ def test_a_marker_half_of_whose_sides_are_hidden_is_not_found(seed: int) -> None
 def test_sides_are_followed_where_the_lens_bends_them() -> None:
     """They are off the straight lines by several pixels."""
     image, truth = picture(3)
-    meetings = side_meetings(image, (truth + [[1.5, -1], [-1, 1], [0.5, 1], [-1, -0.5]])[np.newaxis], 30.0)
+    off = np.array([[1.5, -1], [-1, 1], [0.5, 1], [-1, -0.5]])
+    meetings = side_meetings(image, (truth + off)[np.newaxis], 20.0)
     assert np.linalg.norm(meetings.places[0] - truth, axis=1).max() < 0.15
     assert (meetings.sigmas_px < 0.2).all()
 

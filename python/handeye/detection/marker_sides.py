@@ -33,7 +33,7 @@ BENT_PX = 0.05
 # A corner of an outline is off by this share of the shortest side, at most.
 AWAY_SHARE = 0.15
 # What is known worse than this is not known.
-LARGEST_SIGMA_PX = 0.5
+LARGEST_SIGMA_PX = 0.25
 # Sides meet at a corner once lines are followed to each other so many times.
 MEETINGS = 4
 
