@@ -326,6 +326,7 @@ def worker(inputs: Inputs, numbers: range, to: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (used + MOST_BYTES, used + MOST_BYTES))
     signal.signal(signal.SIGPROF, _too_long)
     with tempfile.TemporaryDirectory() as name, os.fdopen(to, "w") as pipe:
+        os.chdir(name)  # commands write beside themselves
         for number in numbers:
             pipe.write(f"begin\t{number}\n")
             pipe.flush()
