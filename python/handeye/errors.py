@@ -22,7 +22,10 @@ __all__ = [
 
 def printable(text: object, limit: int) -> str:
     """Return a text of others, shortened, without what cannot be shown or would steer a terminal."""
-    shown = str(text)
+    try:
+        shown = str(text)
+    except Exception:  # noqa: BLE001 - whatever a driver's object does
+        shown = "(cannot be shown)"
     cut = shown[:limit] + ("..." if len(shown) > limit else "")
     return "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in cut)
 

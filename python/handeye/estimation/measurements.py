@@ -12,7 +12,7 @@ from handeye.types.arrays import FloatArray
 from handeye.types.camera import Camera
 from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
-from handeye.types.recording import Recording
+from handeye.types.recording import Recording, check_points
 from handeye.types.target import Target
 from handeye.types.view import View
 
@@ -77,6 +77,7 @@ def view_pose(camera: Camera, target: Target, view: View) -> ViewPose:
         raise InputError(
             f"view {view.name}: {len(view)} points, at least {MIN_POINTS} are needed", code="too_few_points"
         )
+    check_points(view, target)
     points = target.points[view.point_ids]
     radii = target.radii_m[view.point_ids]
     try:

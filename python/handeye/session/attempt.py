@@ -256,6 +256,9 @@ def look(
         return Missed(known.get(error.code, Failure.CAMERA_FAILED), error.message, moved=True)
     timings["grab"] = timings.get("grab", 0.0) + time.monotonic() - started
     started = time.monotonic()
+    if frame.image is not None and frame.image.shape == eye.camera.size_px[::-1]:
+        # A driver may write its next picture into the same buffer.
+        frame = replace(frame, image=frame.image.copy())
     found = _look(eye, frame, digests, predicted)
     seen = None if isinstance(found, Missed) else found[0]
     cell.observer.looked(label, frame.image, seen, eye.name)
