@@ -48,10 +48,23 @@ class Edge:
 def read_urdf(path: str | os.PathLike[str], *, base: str | None = None, tip: str | None = None) -> Arm:
     """Read an arm from a URDF file; see `parse_urdf`.
 
+    Parameters
+    ----------
+    path
+        The file.
+    base, tip
+        As in `parse_urdf`.
+
     Raises
     ------
     InputError
         The file cannot be read or used; the message names it and the place in it.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> read_urdf(str(files("handeye.robots") / "arms" / "ur5e.urdf")).name
+    'ur5e'
     """
     file, content = Path(path), read_file(path)
     try:
@@ -97,6 +110,14 @@ def parse_urdf(content: bytes, *, base: str | None = None, tip: str | None = Non
     InputError
         No well-formed XML or unsafe, no URDF, a link that is missing or has two parents, a circle, a number
         that is none or in the wrong units, a joint on the way that cannot be used, or no clear tip.
+
+    Examples
+    --------
+    >>> ends = '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    >>> joint = f'<joint name="j" type="continuous">{ends}</joint>'
+    >>> document = f'<robot name="one"><link name="a"/><link name="b"/>{joint}</robot>'
+    >>> parse_urdf(document.encode()).joint_names
+    ('j',)
     """
     root = read_xml(content)
     if root.tag != "robot":
