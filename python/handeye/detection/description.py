@@ -11,7 +11,7 @@ from handeye.detection.base import Detection, Image, NotFound, Reason, upright
 from handeye.detection.blobs import find_spots
 from handeye.detection.lattice import grow
 from handeye.detection.marker_lattice import boards_like, lattices_of
-from handeye.detection.marker_reading import Reading, read_markers
+from handeye.detection.marker_reading import Reading, is_plain, read_markers
 from handeye.detection.markers import Seen
 from handeye.detection.part import Part
 from handeye.types import Charuco, Chessboard, CircleGrid, Target
@@ -67,7 +67,15 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
 
 
 def shown_board(image: Image) -> Target | None:
-    """Return the board that an image shows, of lengths that are not known; None if it shows none."""
+    """Return the board that an image shows, of lengths that are not known; None if it shows none.
+
+    Raises nothing.
+
+    Examples
+    --------
+    >>> print(shown_board(np.full((480, 640), 255, np.uint8)))
+    None
+    """
     # Small markers only show in the whole picture.
     for side_px in (SEARCH_SIDE_PX, max(image.shape)):
         for board, _ in _visible(image, UNKNOWN, fewest_markers=1, side_px=side_px):
@@ -103,6 +111,9 @@ def _visible(
     for look in without_markers[::-1] if isinstance(target, CircleGrid) else without_markers:
         for board in look(small, target):
             yield board, None
+    # One marker may belong to something else in the picture; it is what is shown where there is nothing else.
+    if reading is not None and not isinstance(target, Coded) and is_plain(reading, image.shape[::-1]):
+        yield from ((board, reading) for board in _marked(image, target, reading, 1))
 
 
 def _marked(image: Image, target: Target, reading: Reading, fewest: int) -> Iterator[Target]:
@@ -216,7 +227,16 @@ def _difference(target: Target, shown: Target) -> str:
 
 
 def without_lengths(board: Target) -> str:
-    """Return a board in words, without what a picture does not tell."""
+    """Return a board in words, without what a picture does not tell.
+
+    Raises nothing.
+
+    Examples
+    --------
+    >>> from handeye.types import Chessboard
+    >>> without_lengths(Chessboard(6, 9, 0.025))
+    'chessboard, rows 6, columns 9'
+    """
     fields = board.to_dict()
     family = fields.pop("family")
     told = [f"{name} {_toml(value)}" for name, value in fields.items() if not name.endswith("_m")]
