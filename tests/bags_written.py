@@ -174,10 +174,11 @@ def _pose(sink: "Sink", journey: Journey, time: float, how: str) -> None:
         ]
         sink.say("/tf", "tf2_msgs/msg/TFMessage", time, sink.make("tf2_msgs/msg/TFMessage", transforms=both))
         return
-    message = sink.make(
-        "geometry_msgs/msg/PoseStamped", header=sink.header(time, "base"), pose=sink.pose(pose)
-    )
-    sink.say("/tcp_pose", "geometry_msgs/msg/PoseStamped", time, message)
+    kind, told = "geometry_msgs/msg/PoseStamped", sink.pose(pose)
+    if how == "pose_with_covariance":
+        kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
+        told = sink.make("geometry_msgs/msg/PoseWithCovariance", pose=told, covariance=np.full(36, 1e-6))
+    sink.say("/tcp_pose", kind, time, sink.make(kind, header=sink.header(time, "base"), pose=told))
 
 
 def _picture(sink: "Sink", time: float, grey: np.ndarray, how: str, *, stamps: bool) -> None:

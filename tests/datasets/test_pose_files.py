@@ -1,5 +1,6 @@
 """Poses from files of any kind."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -180,3 +181,27 @@ def test_hostile_files_are_refused(tmp_path: Path, name: str, text: str) -> None
     with pytest.raises(InputError) as caught:
         read_poses(tmp_path / name, said("ur", MM))
     assert name in caught.value.message
+
+
+POSE = {"position": {"x": 0.1, "y": 0.2, "z": 0.3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+PLAIN = "image,x,y,z,qx,qy,qz,qw"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "called"),
+    [
+        ("a.csv", f"{PLAIN},cov_xx,cov_yy\na.png,1,2,3,0,0,0,1,4,5\nb.png,1,2,3,0,0,0,1,4,5\n", ("cov_xx", "cov_yy")),
+        ("a.csv", "std_x,x,y,z,rx,ry,rz\n9,1,2,3,0,0,1\n9,1,2,3,0,0,1\n", ("std_x",)),
+        ("a.json", json.dumps([{"image": "a.png", "pose": {"pose": POSE, "covariance": [0.0] * 36}}] * 2), ("covariance",)),
+        ("a.yaml", json.dumps({"poses": [{"image": "a.png", **POSE, "sigma_mm": 0.1}] * 2}), ("sigma_mm",)),
+        ("a.csv", f"{PLAIN}\na.png,1,2,3,0,0,0,1\n", ()),
+    ],
+)  # fmt: skip
+def test_accuracies_of_poses_are_passed_over_and_named(
+    name: str, text: str, called: tuple[str, ...], tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    rows = read_pose_rows(tmp_path / name)
+    assert rows.accuracies == called
+    (reading, *_) = rows.readings(Statement(unit=Unit.M))
+    assert [round(float(v), 9) for v in rows.poses(reading)[0].translation] in ([1, 2, 3], [0.1, 0.2, 0.3])

@@ -88,6 +88,15 @@ def test_poses_on_a_topic_and_pictures_without_a_time(journey: Journey, tmp_path
         opened(path, journey, bag=BagOptions(image_topic="/depth"))
 
 
+def test_covariances_of_poses_are_said_not_to_be_used(journey: Journey, tmp_path: Path) -> None:
+    bag = opened(write(tmp_path / "bag", "mcap", journey, poses="pose_with_covariance"), journey)
+    plain = opened(write(tmp_path / "plain", "mcap", journey, poses="pose"), journey)
+    assert len(bag.recording) == len(plain.recording) == journey.stations
+    (said,) = [warning for warning in bag.warnings if warning.code == "accuracies_unused"]
+    assert "covariance" in said.message
+    assert all(warning.code != "accuracies_unused" for warning in plain.warnings)
+
+
 def test_joint_states_with_a_description(tmp_path: Path) -> None:
     arm = open_arm("ur5e")
     journey = Journey(seed=5, stations=5, picture_hz=6, arm=arm, mounting=Mounting.EYE_TO_HAND, lag_s=-0.02)

@@ -53,6 +53,17 @@ def test_stated_poses_are_solved(folder: Path, pictures: tuple[Path, Pose, list[
     assert 1e3 * float((error.translation**2).sum() ** 0.5) < 1.0
 
 
+def test_accuracies_in_the_file_are_said_not_to_be_used(
+    folder: Path, pictures: tuple[Path, Pose, list[Pose]]
+) -> None:
+    rows = WAYS[3].text(names(folder), pictures[2]).splitlines()
+    (folder / "poses.csv").write_text("\n".join([f"{rows[0]},sigma_mm", *(f"{row},0.1" for row in rows[1:])]))
+    options = SourceOptions(camera=PICTURE_CAMERA, stated=Statement(NOTATIONS["kuka"]))
+    opened = open_folder(folder, options)
+    (said,) = [warning for warning in opened.warnings if warning.code == "accuracies_unused"]
+    assert said.message.startswith("poses.csv: how accurate each pose is (sigma) is not used")
+
+
 def test_unstated_poses_are_told_by_the_pictures(
     folder: Path, pictures: tuple[Path, Pose, list[Pose]], handeye: Handeye
 ) -> None:

@@ -115,6 +115,15 @@ def test_what_cannot_be_solved_is_refused() -> None:
         solve_poses(PosePairs("slid", "test", good.mounting, numbered(slid)))
 
 
+@pytest.mark.parametrize("mounting", Mounting)
+def test_the_mounting_with_which_they_agree_is_named(mounting: Mounting) -> None:
+    good = noisy(mounting, 1e-4)
+    other = next(m for m in Mounting if m is not mounting)
+    with pytest.raises(SolveError) as caught:
+        solve_poses(PosePairs("turned", "test", other, good.pairs))
+    assert f"with --mounting {mounting.value} half of them agree" in str(caught.value.hint)
+
+
 def test_the_command_answers_and_says_what_poses_do_not_show(tmp_path: Path, handeye: Handeye) -> None:
     path = tmp_path / "demo.samples"
     path.write_text(easy_samples(Mounting.EYE_TO_HAND))

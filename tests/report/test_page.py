@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from handeye.errors import InputError
+from handeye.estimation import solve
 from handeye.report import Gathered, gather_recording, gather_result, html_page
 from handeye.report.document import Attempt, Request
 from handeye.types import Mounting
@@ -185,8 +187,6 @@ def test_only_the_worst_of_very_many_views_are_drawn() -> None:
 
 def test_result_alone_makes_a_page(tmp_path: Path) -> None:
     opened = opened_cell()
-    from handeye.estimation import solve
-
     solved = solve(opened.recording)
     path = tmp_path / "result.json"
     path.write_text(json.dumps({"recording": "cell 7", "source": "made up", **solved.to_dict()}))
@@ -198,6 +198,15 @@ def test_result_alone_makes_a_page(tmp_path: Path) -> None:
     assert gathered.numbers.answer.within_95 == whole.answer.within_95
     assert gathered.numbers.answer.position_axes == whole.answer.position_axes
     assert [view.rmse_px for view in gathered.numbers.views] == [view.rmse_px for view in whole.views]
+
+
+@pytest.mark.parametrize("key", ["rmse_px", "noise", "model"])
+def test_a_result_that_says_too_little_makes_no_page(tmp_path: Path, key: str) -> None:
+    path = tmp_path / "result.json"
+    told = solve(opened_cell().recording).to_dict() | {key: None if key != "model" else ""}
+    path.write_text(json.dumps(told))
+    with pytest.raises(InputError, match=rf"result\.json: .*{key}"):
+        gather_result(path, command="handeye report result.json")
 
 
 def test_open_directions_come_first() -> None:

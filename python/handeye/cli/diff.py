@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
 from handeye.cli.options import Common
@@ -13,7 +11,7 @@ from handeye.cli.source import Source
 from handeye.errors import InputError
 from handeye.estimation import solve
 from handeye.estimation.difference import difference
-from handeye.export.result import read_result, read_result_json
+from handeye.export.result import read_result
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
@@ -71,14 +69,7 @@ def diff(
 def _read(path: Path, source: Source, arm: ArmSource) -> tuple[Mounting, tuple[Pose, FloatArray, float]]:
     if path.suffix.lower() == ".json" and not path.is_dir():
         result = read_result(path)
-        freedom = read_result_json(path).get("degrees_of_freedom")
-        if not (freedom is None or (isinstance(freedom, int | float) and freedom > 0)):
-            raise InputError(
-                f"{path}: degrees_of_freedom: {freedom!r}, expected a number above zero or null",
-                code="invalid_field",
-            )
-        known = np.inf if freedom is None else float(freedom)
-        return result.mounting, (result.T_parent_camera, result.covariance, known)
+        return result.mounting, (result.T_parent_camera, result.covariance, result.degrees_of_freedom)
     opened = source.open(path, arm.described())
     kinematics = arm.kinematics(opened.recording.views, ModelName.AUTO)
     calibration = solve(opened.recording, kinematics=kinematics)

@@ -4,7 +4,7 @@ These are warnings, not errors: the largest arms reach 4 m and gantries a little
 of 5 mm to 0.5 m, so nobody is bothered who has measured in metres; but nobody is refused either.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,6 +65,18 @@ def pose_warnings(named_poses: Iterable[tuple[str, Pose]]) -> list[DataWarning]:
             f"base (view {name}: {distance:.6g} m): are these millimetres? Divide the translations by 1000.",
         )
     ]
+
+
+def accuracy_warnings(names: Sequence[str], where: str) -> list[DataWarning]:
+    """Return the word that accuracies of single poses, as a file calls them, are not used."""
+    if not names:
+        return []
+    listed = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+    message = (
+        f"{where}: how accurate each pose is ({listed}) is not used: how far the robot errs is found from "
+        "the views themselves"
+    )
+    return [DataWarning("accuracies_unused", message)]
 
 
 def target_warnings(target: Target) -> list[DataWarning]:

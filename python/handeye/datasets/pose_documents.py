@@ -1,12 +1,13 @@
 """Poses from JSON, YAML and FileStorage: lists, tables by name, one pose alone, wrapped or not."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
 from handeye.datasets.documents import read_document_file
-from handeye.datasets.pose_labels import INDICES, NAMES, TIMES, columns_of
+from handeye.datasets.pose_labels import INDICES, NAMES, TIMES, columns_of, is_accuracy
 from handeye.datasets.pose_rows import POSITION, QUATERNION, ROTATION_VECTOR, PoseRows
 from handeye.datasets.pose_text import MAX_NAME_LENGTH, rows_of, statement_of
 from handeye.errors import InputError
@@ -73,7 +74,9 @@ def rows_of_document(document: object, path: Path) -> PoseRows:
         if other != labels:
             raise InputError(f"{path}: entry {index + 1} has other fields than the first", code="wrong_shape")
     rows = [(name, numbers, f"entry {index + 1}") for index, (name, numbers, _) in enumerate(found)]
-    return rows_of(path, rows, stated, labels)
+    return replace(
+        rows_of(path, rows, stated, labels), accuracies=tuple(_accuracies(cast("object", document), 0))
+    )
 
 
 def _poses(item: object, depth: int) -> list[_Found]:
@@ -100,6 +103,21 @@ def _poses(item: object, depth: int) -> list[_Found]:
         lists = [found for value in rest.values() if (found := _poses(value, depth + 1))]
         return max(lists, key=len) if lists else []
     return []
+
+
+def _accuracies(item: object, depth: int) -> Iterator[str]:
+    """Yield what accuracies are called, as the first entry of each list has them."""
+    if depth > _MAX_DEPTH:
+        return
+    if isinstance(item, Mapping):
+        for key, value in cast("Mapping[object, object]", item).items():
+            if is_accuracy(str(key).lower()):
+                yield str(key).lower()[:MAX_NAME_LENGTH]
+            else:
+                yield from _accuracies(value, depth + 1)
+    elif isinstance(item, list):
+        for value in cast("list[object]", item)[:1]:
+            yield from _accuracies(value, depth + 1)
 
 
 def _is_wrapper(key: object) -> bool:

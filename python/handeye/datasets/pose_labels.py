@@ -31,6 +31,8 @@ INDICES = frozenset(
 TIMES = frozenset(
     ("t", "time", "timestamp", "stamp", "time_s", "timestamp_s", "timestamp_ns", "sec", "seconds")
 )
+# What says how accurate a pose is: no part of it.
+_ACCURACY = re.compile(r"^(cov|sigma|std|stddev|var|variance|uncert|accuracy|weight)", re.ASCII)
 # The third angle in x, y, z, r, p, y.
 _SECOND_Y = "y2"
 _PREFIXES = re.compile(
@@ -59,6 +61,8 @@ class Columns:
         Whether the header says degrees (True) or radians (False).
     has_time
         Whether there is a column of times.
+    accuracies
+        Names of the columns that say how accurate each pose is; they are not read.
     """
 
     name: int | None
@@ -67,6 +71,7 @@ class Columns:
     unit: Unit | None = None
     degrees: bool | None = None
     has_time: bool = False
+    accuracies: tuple[str, ...] = ()
 
 
 def columns_of(header: Sequence[str]) -> Columns:
@@ -89,7 +94,9 @@ def columns_of(header: Sequence[str]) -> Columns:
     # The third angle of Kawasaki is called T.
     is_time = TIMES - {"t"} if {"o", "a", "t"} <= set(labels) else TIMES
     times = [i for i, label in enumerate(labels) if label in is_time and i != name]
-    left = [i for i in range(len(labels)) if i != name and i not in times and labels[i] not in NAMES]
+    accuracies = [i for i, label in enumerate(labels) if is_accuracy(label)]
+    passed_over = {name, *times, *accuracies}
+    left = [i for i in range(len(labels)) if i not in passed_over and labels[i] not in NAMES]
     chosen = _pose_columns(labels, left)
     twice = [labels[i] for i in chosen if labels.count(labels[i]) > 1]
     if twice:
@@ -103,7 +110,13 @@ def columns_of(header: Sequence[str]) -> Columns:
         Unit(next(iter(lengths))) if len(lengths) == 1 else None,
         angles == {"deg"} if len(angles) == 1 else None,
         bool(times),
+        tuple(labels[i] for i in accuracies),
     )
+
+
+def is_accuracy(label: str) -> bool:
+    """Tell whether a name in small letters is that of a covariance, a deviation or a weight."""
+    return _ACCURACY.match(label) is not None
 
 
 def _pose_columns(labels: Sequence[str], left: Sequence[int]) -> list[int]:

@@ -33,7 +33,13 @@ from handeye.datasets.image_set import (
 from handeye.datasets.importer import Importer
 from handeye.datasets.joint_states import read_joint_rows
 from handeye.datasets.parameter_files import read_target
-from handeye.datasets.plausibility import DataWarning, camera_warnings, pose_warnings, target_warnings
+from handeye.datasets.plausibility import (
+    DataWarning,
+    accuracy_warnings,
+    camera_warnings,
+    pose_warnings,
+    target_warnings,
+)
 from handeye.datasets.pose_files import read_pose_rows
 from handeye.datasets.pose_rows import PoseRows
 from handeye.datasets.reading import file_names, folder_names, is_file, located
@@ -95,7 +101,12 @@ def read(folder: Path, options: ImportOptions) -> ImageSet | UnreadPoses:
         image_size_px=size,
         camera=camera,
         source=f"pictures and {file} in folder {folder.resolve().name}",
-        warnings=(*warnings, *camera_notes, *target_warnings(target)),
+        warnings=(
+            *warnings,
+            *accuracy_warnings(rows.accuracies, file),
+            *camera_notes,
+            *target_warnings(target),
+        ),
     )
     if known:
         named = zip((shot.name for shot in shots), poses, strict=True)

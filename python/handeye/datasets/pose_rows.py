@@ -108,6 +108,8 @@ class PoseRows:
         Whether the file says that its angles are in degrees or radians; None if it does not.
     has_time
         Whether a column of times was left out.
+    accuracies
+        What the file calls the accuracies of its poses, which are not read; empty if there are none.
     joints
         (N, n) joint positions of each row, radians; None where they are not known.
     """
@@ -120,6 +122,7 @@ class PoseRows:
     stated: Statement = field(default_factory=Statement)
     degrees: bool | None = None
     has_time: bool = False
+    accuracies: tuple[str, ...] = ()
     joints: FloatArray | None = None
 
     def __len__(self) -> int:

@@ -6,6 +6,7 @@ Decimal commas, semicolons, tabs, a byte order mark and line ends of any system 
 import csv
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -191,9 +192,7 @@ def _under_header(
         found.append((name, numbers, place))
     said = stated if columns.unit is None else stated.over(Statement(unit=columns.unit))
     plain = rows_of(path, found, said, columns.labels)
-    return PoseRows(
-        path, plain.names, plain.values, plain.places, columns.labels, said, columns.degrees, columns.has_time
-    )
+    return replace(plain, degrees=columns.degrees, has_time=columns.has_time, accuracies=columns.accuracies)
 
 
 def _with_letters(lines: Sequence[tuple[str, str]]) -> list[_Row]:

@@ -7,43 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-import msgspec
 import numpy as np
 
 from handeye.datasets.reading import MIB, located, read_text
 from handeye.errors import InputError
+from handeye.export.solved import Rows, Solved
 from handeye.types import Camera, Mounting, Pose
 from handeye.types.arrays import FloatArray, finite_array
 from handeye.types.calibration import Calibration
 from handeye.types.plain import read_document
 
 MAX_BYTES = 16 * MIB
-
-_Rows = list[list[float]]
-
-
-class _Views(msgspec.Struct):
-    used: list[str] = []
-
-
-class _Unobservable(msgspec.Struct):
-    sentence: str
-
-
-class _ResultDocument(msgspec.Struct):
-    """What is needed of the JSON of a solve; it has more."""
-
-    mounting: Mounting
-    covariance: _Rows
-    T_flange_camera: _Rows | None = None
-    T_base_camera: _Rows | None = None
-    T_base_target: _Rows | None = None
-    T_flange_target: _Rows | None = None
-    recording: str = ""
-    views: _Views = msgspec.field(default_factory=_Views)
-    warnings: list[str] = []
-    unobservable: list[_Unobservable] = []
-    camera: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +42,10 @@ class Result:
         Number of views that the answer rests on.
     warnings
         What to know before it is used.
+    degrees_of_freedom
+        How sure the covariance itself is.
+    solved
+        All that the solve said; None where it was not one of pictures.
     """
 
     mounting: Mounting
@@ -78,27 +56,21 @@ class Result:
     recording: str = ""
     view_count: int = 0
     warnings: tuple[str, ...] = ()
+    degrees_of_freedom: float = float("inf")
+    solved: Solved | None = None
 
     @classmethod
-    def of(cls, calibration: Calibration, recording: str, warnings: Iterable[str] = ()) -> "Result":
+    def of(
+        cls,
+        calibration: Calibration,
+        recording: str,
+        warnings: Iterable[str] = (),
+        **more: Any,  # noqa: ANN401 - further keys of the document
+    ) -> "Result":
         """Return the answer of a calibration, with warnings about the recording before its own."""
-        camera_pose, target_pose = calibration.results.values()
-        return cls(
-            calibration.mounting,
-            camera_pose,
-            target_pose,
-            calibration.covariance,
-            calibration.camera,
-            recording,
-            len(calibration.used),
-            _once(
-                [
-                    *(direction.sentence for direction in calibration.unobservable),
-                    *warnings,
-                    *calibration.warnings,
-                ]
-            ),
-        )
+        table = {**calibration.to_dict(), "recording": recording, **more}
+        table["warnings"] = [*warnings, *calibration.warnings]
+        return _result(read_document(table, Solved, recording))
 
     @property
     def sigma_translation_m(self) -> float:
@@ -127,27 +99,33 @@ def read_result(path: str | os.PathLike[str], camera: str | None = None) -> Resu
         Not such a file; the message names file and field. Or a camera that is not in it.
     """
     file = Path(path)
-    document = read_document(_of_camera(read_result_json(file), camera, file), _ResultDocument, str(file))
-    camera_name, target_name = document.mounting.result_names
+    document = read_document(_of_camera(_read_json(file), camera, file), Solved, str(file))
     with located(str(file)):
-        poses: list[Pose] = []
-        for name in (camera_name, target_name):
-            rows = cast("_Rows | None", getattr(document, name))
-            if rows is None:
-                raise InputError(
-                    f"{name} is missing, though mounting is {document.mounting.value}", code="invalid_field"
-                )
-            with located(name):
-                poses.append(Pose(rows))
-        return Result(
-            document.mounting,
-            *poses,
-            covariance=_covariance(document.covariance),
-            camera=None if document.camera is None else Camera.from_dict(document.camera),
-            recording=document.recording,
-            view_count=len(document.views.used),
-            warnings=_once([*(found.sentence for found in document.unobservable), *document.warnings]),
-        )
+        return _result(document)
+
+
+def _result(document: Solved) -> Result:
+    poses: list[Pose] = []
+    for name in document.mounting.result_names:
+        rows = cast("Rows | None", getattr(document, name))
+        if rows is None:
+            raise InputError(
+                f"{name} is missing, though mounting is {document.mounting.value}", code="invalid_field"
+            )
+        with located(name):
+            poses.append(Pose(rows))
+    freedom = document.degrees_of_freedom
+    return Result(
+        document.mounting,
+        *poses,
+        covariance=_covariance(document.covariance),
+        camera=None if document.camera is None else Camera.from_dict(document.camera),
+        recording=document.recording,
+        view_count=len(document.views.used),
+        warnings=_once([*(found.sentence for found in document.unobservable), *document.warnings]),
+        degrees_of_freedom=float("inf") if freedom is None else freedom,
+        solved=document,
+    )
 
 
 def _of_camera(table: dict[str, Any], camera: str | None, file: Path) -> dict[str, Any]:
@@ -167,7 +145,7 @@ def _of_camera(table: dict[str, Any], camera: str | None, file: Path) -> dict[st
     return {"recording": table.get("recording", ""), **cast("dict[str, Any]", chosen)}
 
 
-def read_result_json(file: Path) -> dict[str, Any]:
+def _read_json(file: Path) -> dict[str, Any]:
     """Return the JSON object in a file that a solve wrote.
 
     Raises
@@ -192,7 +170,7 @@ def read_result_json(file: Path) -> dict[str, Any]:
     return table
 
 
-def _covariance(rows: _Rows) -> FloatArray:
+def _covariance(rows: Rows) -> FloatArray:
     covariance = finite_array(rows, (6, 6), "covariance")
     scale = np.sqrt(np.abs(np.outer(np.diag(covariance), np.diag(covariance))))
     symmetric = bool(np.all(np.abs(covariance - covariance.T) <= 1e-6 * scale))

@@ -9,8 +9,17 @@ import numpy as np
 from handeye.datasets import DataWarning
 from handeye.datasets.bags import Contents, TimesOf, Track, chain, parents, rising, way
 from handeye.datasets.bags.contents import Joints, Stamps, matrices
-from handeye.datasets.bags.messages import CAMERA_INFO, COMPRESSED, IMAGE, JOINTS, POSE, CameraInfo
+from handeye.datasets.bags.messages import (
+    CAMERA_INFO,
+    COMPRESSED,
+    IMAGE,
+    JOINTS,
+    POSE,
+    POSE_WITH_COVARIANCE,
+    CameraInfo,
+)
 from handeye.datasets.camera_files import camera_info
+from handeye.datasets.plausibility import accuracy_warnings
 from handeye.errors import HandeyeError, InputError
 from handeye.robots import Arm, parse_urdf
 from handeye.types import Camera
@@ -104,7 +113,10 @@ def choose(contents: Contents, options: BagOptions, arm: Arm | None) -> Chosen:
         )
         warnings.append(DataWarning("bag_cut", message))
     track = poses.track(times_of)
-    warnings += [DataWarning("poses_assumed", f"the flange's poses are {track.words}{poses.how}")]
+    warnings += [
+        *poses.warnings,
+        DataWarning("poses_assumed", f"the flange's poses are {track.words}{poses.how}"),
+    ]
     camera, notes = _camera(contents, topic)
     return Chosen(topic, times_of(pictures), track, camera, (*warnings, *notes))
 
@@ -141,6 +153,7 @@ class _Source:
 
     def __init__(self, streams: Sequence[Stamps], how: str = "") -> None:
         self.streams, self.how = streams, how
+        self.warnings: list[DataWarning] = []
 
     def track(self, times_of: TimesOf) -> Track:
         raise NotImplementedError
@@ -150,6 +163,8 @@ class _OfTopic(_Source):
     def __init__(self, contents: Contents, topic: str) -> None:
         self._poses, self._topic = contents.poses[topic], topic
         super().__init__([self._poses])
+        if contents.topics[topic].kind == POSE_WITH_COVARIANCE:
+            self.warnings = accuracy_warnings(["covariance"], topic)
 
     def track(self, times_of: TimesOf) -> Track:
         return rising(times_of(self._poses), matrices(self._poses.values), f"those on {self._topic}")

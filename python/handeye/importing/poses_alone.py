@@ -5,7 +5,7 @@ noise of the detector (across and along its line of sight, and in rotation) is f
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,16 +104,15 @@ def solve_poses(pairs: PosePairs) -> PosesSolved:
             f"{pairs.name}: {len(pairs)} samples, at least {MIN_VIEWS} are needed", code="too_few_views"
         )
     motions, seen = pairs.motions, pairs.camera_poses
-    kept = _agreeing(motions, seen, *first_fit(motions, seen))
-    x, y = first_fit(motions[kept], seen[kept])
-    angles, distances = chain_errors(x @ motions @ y, seen)
-    if np.median(angles) > FITS_RAD or np.median(distances) > FITS_M:
+    kept, x, y = _first_fit(pairs)
+    distance, angle = _half_within(pairs, x, y)
+    if angle > FITS_RAD or distance > FITS_M:
         raise SolveError(
             f"{pairs.name}: the poses of robot and target contradict each other: half of the {len(pairs)} "
-            f"samples are off by more than {1e3 * np.median(distances):.3g} mm and "
-            f"{np.rad2deg(np.median(angles)):.2g} deg",
+            f"samples are off by more than {1e3 * distance:.3g} mm and {np.rad2deg(angle):.2g} deg",
             code="inconsistent",
-            hint="are both in metres, in the same order, and the poses of the target those in the camera?",
+            hint=_other_mounting(pairs)
+            or "are both in metres, in the same order, and the poses of the target those in the camera?",
         )
     posterior = _posterior(pairs, kept, x, y)
     X, Y = Pose(posterior.x[0]), Pose(posterior.y[0])
@@ -134,6 +133,29 @@ def solve_poses(pairs: PosePairs) -> PosesSolved:
             if k not in kept
         },
     )
+
+
+def _first_fit(pairs: PosePairs) -> tuple[list[int], FloatArray, FloatArray]:
+    """Return which samples agree, and X and Y (4, 4) that fit them."""
+    motions, seen = pairs.motions, pairs.camera_poses
+    kept = _agreeing(motions, seen, *first_fit(motions, seen))
+    return kept, *first_fit(motions[kept], seen[kept])
+
+
+def _half_within(pairs: PosePairs, x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Return how far half of the samples are off, in metres and radians."""
+    angles, distances = chain_errors(x @ pairs.motions @ y, pairs.camera_poses)
+    return float(np.median(distances)), float(np.median(angles))
+
+
+def _other_mounting(pairs: PosePairs) -> str | None:
+    """Say that the samples agree with the camera in the other place; None if they do not."""
+    other = next(mounting for mounting in Mounting if mounting is not pairs.mounting)
+    turned = replace(pairs, mounting=other)
+    distance, angle = _half_within(turned, *_first_fit(turned)[1:])
+    if angle > FITS_RAD or distance > FITS_M:
+        return None
+    return f"with --mounting {other.value} half of them agree within {1e3 * distance:.2g} mm"
 
 
 def first_fit(motions: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:

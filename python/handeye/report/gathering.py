@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from handeye.datasets.reading import located
+from handeye.errors import InputError
 from handeye.estimation import Measurements, calibrate_examined
 from handeye.estimation.estimate import corrected
 from handeye.estimation.faults import examine
 from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text
-from handeye.export.result import read_result, read_result_json
+from handeye.export.result import read_result
+from handeye.export.solved import Noise, Solved
 from handeye.importing import Opened
 from handeye.report import document
 from handeye.report.advice import advice
@@ -20,11 +23,9 @@ from handeye.report.drawings import Drawing, drawings_of
 from handeye.report.history import arm_of, attempts, curve, request
 from handeye.report.recipe import recipe
 from handeye.report.regions import USUAL_DISTANCES_M, at_points, position_axes, rotation_axes, within
-from handeye.report.solved import Solved
 from handeye.report.views import ViewPicture, view_lines, view_picture
 from handeye.types import Camera, Mounting, Pose, Recording, Target
 from handeye.types.calibration import MM_PER_M, Calibration, ModelName
-from handeye.types.plain import read_document
 
 # Formats that a report shows, ready to be copied.
 SHOWN_EXPORTS = ("ros2", "urdf", "easy_handeye2", "opencv")
@@ -98,18 +99,18 @@ def gather_recording(
     calibration = calibrate_examined(examination, model, reduced=reduced, kinematics=kinematics)
     measurements = examination.among(measurements)
     warnings = [str(warning) for warning in opened.warnings]
-    solved = read_document(
-        calibration.to_dict() | {"camera_origin": opened.camera_origin.value, "source": recording.source},
-        Solved,
-        recording.name,
-    )
     known = within(calibration.covariance, calibration.degrees_of_freedom)
     lines = view_lines(calibration, measurements)
     distances = _working_distances(line.distance_mm for line in lines if line.used)
     used = [i for i, view in enumerate(measurements.views) if view.name in set(calibration.used)]
     numbers = _report(
-        Result.of(calibration, recording.name, warnings),
-        solved,
+        Result.of(
+            calibration,
+            recording.name,
+            warnings,
+            camera_origin=opened.camera_origin.value,
+            source=recording.source,
+        ),
         distances,
         warnings=[*warnings, *calibration.warnings],
         target=recording.target.to_dict(),
@@ -144,33 +145,45 @@ def gather_result(path: Path, *, command: str, made: str | None = None) -> Gathe
         Not such a file.
     """
     result = read_result(path)
-    solved = read_document(read_result_json(path), Solved, str(path))
-    views = [
-        ViewLine(name=name, used=True, reason="", rmse_px=solved.views.rmse_px.get(name))
-        for name in solved.views.used
-    ]
-    views += [ViewLine(name=view.name, used=False, reason=view.reason) for view in solved.views.rejected]
-    sentences = {direction.sentence for direction in solved.unobservable}
-    numbers = _report(
-        result,
-        solved,
-        [(distance, "") for distance in USUAL_DISTANCES_M],
-        warnings=[warning for warning in result.warnings if warning not in sentences],
-        views=views,
-        recipe=recipe(command, None, made),
-    )
+    with located(str(path)):
+        solved, _, _ = _told(result)
+        views = [
+            ViewLine(name=name, used=True, reason="", rmse_px=solved.views.rmse_px.get(name))
+            for name in solved.views.used
+        ]
+        views += [ViewLine(name=view.name, used=False, reason=view.reason) for view in solved.views.rejected]
+        sentences = {direction.sentence for direction in solved.unobservable}
+        numbers = _report(
+            result,
+            [(distance, "") for distance in USUAL_DISTANCES_M],
+            warnings=[warning for warning in result.warnings if warning not in sentences],
+            views=views,
+            recipe=recipe(command, None, made),
+        )
     return Gathered(
         numbers,
         Scene(result.mounting, result.T_parent_camera, result.T_fixed_target, result.camera, None),
     )
 
 
+def _told(result: Result) -> tuple[Solved, Noise, float]:
+    """Return all that the solve said, its noise and its residual."""
+    solved = result.solved
+    if solved is None or solved.noise is None or solved.rmse_px is None or not solved.model:
+        raise InputError(
+            "rmse_px, noise or model is missing, expected all that a solve writes",
+            code="invalid_field",
+            hint="give the JSON object as `handeye solve --json` wrote it",
+        )
+    return solved, solved.noise, solved.rmse_px
+
+
 def _report(
     result: Result,
-    solved: Solved,
     distances: list[tuple[float, str]],
     **parts: Any,  # noqa: ANN401 - fields
 ) -> Report:
+    solved, noise, rmse_px = _told(result)
     mount = Mount(result, Frames.usual(result.mounting))
     optional: dict[str, Any] = {
         "target": None,
@@ -188,18 +201,18 @@ def _report(
         model=solved.model,
         camera=None if result.camera is None else result.camera.to_dict(),
         camera_origin=solved.camera_origin,
-        answer=_answer(result, solved, distances),
+        answer=_answer(result, distances),
         noise=NoiseLevels(
-            pixel_sigma_px=solved.noise.pixel_sigma_px,
-            robot_side=solved.noise.robot_side,
-            robot_translation_mm=solved.noise.robot_translation_mm,
-            robot_rotation_deg=solved.noise.robot_rotation_deg,
-            how=solved.noise.how,
-            evidence=solved.noise.evidence,
+            pixel_sigma_px=noise.pixel_sigma_px,
+            robot_side=noise.robot_side,
+            robot_translation_mm=noise.robot_translation_mm,
+            robot_rotation_deg=noise.robot_rotation_deg,
+            how=noise.how,
+            evidence=noise.evidence,
         ),
         start=solved.start,
         ending=solved.ending,
-        rmse_px=solved.rmse_px,
+        rmse_px=rmse_px,
         diagnosis=[
             Said(code=f.code, sentence=f.sentence, advice=advice(f.code), evidence=f.evidence)
             for f in solved.diagnosis
@@ -213,11 +226,11 @@ def _report(
     )
 
 
-def _answer(result: Result, solved: Solved, distances: list[tuple[float, str]]) -> Answer:
+def _answer(result: Result, distances: list[tuple[float, str]]) -> Answer:
     in_hand = result.mounting is Mounting.EYE_IN_HAND
     parent = "flange" if in_hand else "base"
     pose, covariance = result.T_parent_camera, result.covariance
-    freedom = float("inf") if solved.degrees_of_freedom is None else solved.degrees_of_freedom
+    freedom = result.degrees_of_freedom
     spread = pose.rotation @ covariance[:3, :3] @ pose.rotation.T
     return Answer(
         parent=parent,
@@ -235,7 +248,7 @@ def _answer(result: Result, solved: Solved, distances: list[tuple[float, str]]) 
         rotation_axes=rotation_axes(covariance, freedom, pose.rotation, parent),
         points=at_points(covariance, freedom, distances),
         covariance=covariance.tolist(),
-        degrees_of_freedom=solved.degrees_of_freedom,
+        degrees_of_freedom=None if np.isinf(freedom) else freedom,
     )
 
 

@@ -1,10 +1,12 @@
 """Are mistakes found and named, and does a repair bring back the answer? One planted mistake each, and none.
 
 A mistake is named right if the first finding has its code and, where it concerns single views, exactly these
-views. An answer is wrong if the region stated at 95 % misses the truth, though that of the same recording
-without the mistake holds it. A repair brings the answer back if it moves the camera's centre by less than the
-stated radius of the clean answer. The truth of a set without any is the answer of all its views. Sets are
-taken both ways round: with every pose inverted the other mounting has made the same views.
+views; a mirror image in pictures or poses also where it names both, as no view tells them apart. An answer
+is wrong if the region stated at 95 % misses the truth, though that of the same recording without the mistake
+holds it. A repair brings the answer back if it moves the camera's centre by less than the stated radius of
+the clean answer; where the views that are left determine none, mistake or not, it is not counted. The truth
+of a set without any is the answer of all its views, as certain as that is. Sets are taken both ways round:
+with every pose inverted the other mounting has made the same views.
 """
 
 import zlib
@@ -17,12 +19,13 @@ from typing import Any
 import numpy as np
 
 from handeye.compute.parallel import Progress, Workers, run_all
-from handeye.errors import DegenerateError, HandeyeError
+from handeye.errors import DegenerateError, HandeyeError, InputError
 from handeye.estimation import calibrate_examined, solve
 from handeye.estimation.confidence import within
 from handeye.estimation.faults import CODES, Diagnosis, diagnose
 from handeye.studies.planted import EXPECTED, Mistake, can_be_planted, made_up, plant
-from handeye.types import Mounting, Pose, Recording
+from handeye.types import Mounting, Pose, Recording, Truth
+from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName
 from handeye.validation import metrics
 
@@ -32,6 +35,7 @@ FEWEST, MOST = 8, 20
 MOST_DRAWS = 20
 # Metres, pixels and elements of rotations that differ by less are rounded.
 SAME = 1e-9
+MM_PER_M = 1000.0
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,7 @@ def study_mistakes(
         A cell could not be drawn, or an estimate of a clean recording failed.
     """
     kinds = tuple(map(Mistake, kinds))
-    bases = tuple(_Base(recording, _reference(recording)) for recording in sets)
+    bases = tuple(_base(recording) for recording in sets)
     jobs = [
         _Job(kind, ModelName(model), seed, bases, tuple(range(i, min(i + RUNS_PER_PIECE, count))))
         for kind, count in [*((kind, trials) for kind in kinds), (None, trials * len(kinds))]
@@ -144,16 +148,25 @@ def study_mistakes(
 
 @dataclass(frozen=True)
 class _Base:
-    """A set, and where its camera truly is as far as that is known."""
+    """A set with its truth, how certain that is, and how far the arm errs by."""
 
     recording: Recording
     X: Pose
+    covariance: FloatArray
+    arm_mm: float
 
 
-def _reference(recording: Recording) -> Pose:
-    if recording.truth is not None and recording.truth.X is not None:
-        return recording.truth.X
-    return solve(recording).X
+def _base(recording: Recording) -> _Base:
+    """Return a set with what all its views say where it has no truth."""
+    answer, given = solve(recording), recording.truth
+    known = given.X if given is not None else None
+    truth = Truth(known or answer.X, (given.Y if given is not None else None) or answer.Y)
+    return _Base(
+        replace(recording, truth=truth),
+        known or answer.X,
+        answer.covariance if known is None else np.zeros((6, 6)),
+        answer.noise.robot_translation_m * MM_PER_M,
+    )
 
 
 @dataclass(frozen=True)
@@ -173,25 +186,26 @@ def _one(job: _Job, number: int) -> Run | None:
     mistake = "" if job.mistake is None else job.mistake.value
     random = np.random.default_rng([job.seed, number, zlib.crc32(mistake.encode())])
     if job.mistake is None:
-        clean, _ = _clean(job, number, random)
+        clean = _clean(job, number, random).recording
         findings = diagnose(clean).findings
         said = next((finding.code for finding in findings if finding.code in CODES), "")
         nothing = {"translation_mm": float("nan"), "clean_translation_mm": float("nan")}
         return Run(number, clean.name, said, not said, not said, wrong=False, restored=None, **nothing)
     for _ in range(MOST_DRAWS):
-        clean, X_true = _clean(job, number, random)
-        if not can_be_planted(clean, job.mistake):
+        base = _clean(job, number, random)
+        if not can_be_planted(base.recording, job.mistake, base.arm_mm):
             return None
-        with suppress(DegenerateError):
-            return _planted(_Clean(clean, X_true, job.model), job.mistake, number, random)
+        # What is refused without a mistake is counted among the clean ones.
+        with suppress(DegenerateError, InputError):
+            return _planted(_Clean(base, job.model), job.mistake, number, random)
     raise DegenerateError(f"recording {number}: its views never determine an answer")
 
 
 class _Clean:
-    """A clean recording, its true X, and the answer to it once that is asked for."""
+    """A clean recording, and the answer to it once that is asked for."""
 
-    def __init__(self, recording: Recording, X_true: Pose, model: ModelName) -> None:
-        self.recording, self.X_true, self.model = recording, X_true, model
+    def __init__(self, base: _Base, model: ModelName) -> None:
+        self.base, self.recording, self.model = base, base.recording, model
 
     @cached_property
     def answer(self) -> Calibration:
@@ -199,7 +213,7 @@ class _Clean:
 
 
 def _planted(clean: _Clean, mistake: Mistake, number: int, random: np.random.Generator) -> Run:
-    recording, views = plant(clean.recording, mistake, random)
+    recording, views = plant(clean.recording, mistake, random, clean.base.arm_mm)
     diagnosis = diagnose(recording)
     first = diagnosis.findings[0] if diagnosis.findings else None
     after = _answer(diagnosis, clean.model)
@@ -208,7 +222,8 @@ def _planted(clean: _Clean, mistake: Mistake, number: int, random: np.random.Gen
     else:
         said = "" if first is None else first.code
         concerned = [] if first is None else sorted(first.evidence["views"])
-    named = said == EXPECTED[mistake] and (not views or concerned == sorted(views))
+    as_well: list[str] = [] if first is None else first.evidence.get("as_well", [])
+    named = EXPECTED[mistake] in {said, *as_well} and (not views or concerned == sorted(views))
     if not named:
         _ = clean.answer  # what determines nothing without a mistake counts for nothing
     restored = None
@@ -217,26 +232,29 @@ def _planted(clean: _Clean, mistake: Mistake, number: int, random: np.random.Gen
     run = Run(number, clean.recording.name, said, named, False, False, restored, np.nan, np.nan)
     if not isinstance(after, Calibration):
         return run
-    before, X_true = clean.answer, clean.X_true
+    before, X_true = clean.answer, clean.base.X
     return replace(
         run,
         answered=True,
-        wrong=_holds(before, X_true) and not _holds(after, X_true),
+        wrong=_holds(before, clean.base) and not _holds(after, clean.base),
         translation_mm=metrics.absolute_error(after.X, X_true).translation_mm,
         clean_translation_mm=metrics.absolute_error(before.X, X_true).translation_mm,
     )
 
 
-def _clean(job: _Job, number: int, random: np.random.Generator) -> tuple[Recording, Pose]:
-    """Return a clean recording and its true X: simulated ones and sets take turns."""
+def _clean(job: _Job, number: int, random: np.random.Generator) -> _Base:
+    """Return a clean recording with its truth: simulated ones and sets take turns."""
     turn, round_ = number % (len(job.bases) + 2), number // (len(job.bases) + 2)
     if turn < 2:
         # Both mountings in turn, then targets and errors of the arm.
         recording = made_up(4 * round_ + 2 * turn + round_ % 2, job.seed)
-        return recording, _reference(recording)
+        truth = recording.truth
+        if truth is None or truth.X is None:
+            raise AssertionError  # simulated
+        return _Base(recording, truth.X, np.zeros((6, 6)), arm_mm=0.0)
     base = job.bases[turn - 2]
     recording = _part(base.recording, random)
-    return (_other_way_round(recording) if round_ % 2 else recording), base.X
+    return replace(base, recording=_other_way_round(recording) if round_ % 2 else recording)
 
 
 def _part(recording: Recording, random: np.random.Generator) -> Recording:
@@ -268,17 +286,24 @@ def _answer(diagnosis: Diagnosis, model: ModelName) -> Calibration | HandeyeErro
         return error
 
 
-def _holds(calibration: Calibration, X_true: Pose) -> bool:
-    squared = metrics.nees(calibration.X, calibration.covariance, X_true)
+def _holds(calibration: Calibration, base: _Base) -> bool:
+    squared = metrics.nees(calibration.X, calibration.covariance + base.covariance, base.X)
     return metrics.region_holds(squared, calibration.degrees_of_freedom)
 
 
-def _is_restored(repaired: Recording, clean: _Clean) -> bool:
+def _is_restored(repaired: Recording, clean: _Clean) -> bool | None:
+    """Tell whether a repair brings back the answer; None where the views left have none anyway."""
     if _same(repaired, clean.recording):
         return True
     try:
         calibration = solve(repaired, clean.model)
     except HandeyeError:
+        left = {view.name for view in repaired.views}
+        kept = clean.recording.with_views(view for view in clean.recording.views if view.name in left)
+        try:
+            solve(kept, clean.model)
+        except DegenerateError:
+            return None
         return False
     expected = clean.answer
     radius = within(expected.covariance, expected.degrees_of_freedom).translation_mm

@@ -14,7 +14,6 @@ from handeye.types import Pose, Recording
 
 SHARED = (
     Mistake.WRONG_ROTATION,
-    Mistake.MIRRORED,
     Mistake.BOARD_SIZE,
     Mistake.CAMERA_SIZE,
     Mistake.STRETCHED,
@@ -59,6 +58,16 @@ def test_a_repair_brings_back_the_clean_answer(mistake: Mistake, number: int) ->
     answer, expected = solve(diagnosis.repaired), solve(clean)
     off = (answer.X @ expected.X.inverse()).translation
     assert np.linalg.norm(off) < 3 * max(expected.sigma_translation_m, 1e-4)
+
+
+@pytest.mark.parametrize("number", [0, 6])
+def test_a_mirror_image_names_both_causes_and_is_not_put_right(number: int) -> None:
+    recording, _ = plant(made_up(number, 3), Mistake.MIRRORED, np.random.default_rng(number))
+    diagnosis = diagnose(recording)
+    (finding,) = diagnosis.findings
+    assert {finding.code, *finding.evidence["as_well"]} == {"mirrored_pictures", "wrong_rotation"}
+    assert "left-handed" in finding.sentence
+    assert diagnosis.repaired is None
 
 
 def test_a_healthy_recording_has_no_findings() -> None:

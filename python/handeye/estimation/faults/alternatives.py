@@ -11,19 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from handeye.errors import HandeyeError
+from handeye.errors import HandeyeError, SolveError
 from handeye.estimation.faults.consensus import closed_forms, distances
-from handeye.estimation.faults.explanation import Explanation, explain
+from handeye.estimation.faults.explanation import BEARABLE_SCALE, Explanation, explain
 from handeye.estimation.faults.kinds import (
     HYPOTHESES,
     Hypothesis,
     SharedFaultError,
+    board_size,
     inconsistent,
     view_shuffled,
     wrong_direction,
 )
 from handeye.estimation.faults.kinds.numbers import angles_between
 from handeye.estimation.faults.kinds.wrong_rotation import ODD
+from handeye.estimation.faults.selection import FEWEST_VIEWS
 from handeye.estimation.faults.shuffles import find_pairing
 from handeye.estimation.faults.stations import Stations, centres, inverted, target_centre
 from handeye.estimation.measurements import Measurements
@@ -40,6 +42,9 @@ MOST_RIVALS = 2
 # given.
 MOST_EXPLAINED = 8
 BETTER_SHARE = 0.7
+# Where the views agree as given, the inverse is explained if its misfit in closed form is below so many times
+# that as given.
+NEARLY = 3.0
 # Angles between views may be off by so much, in the middle, before a reading is dropped.
 TURN_SLACK_RAD = np.deg2rad(2.0)
 # Of what has no change, such as views that have to be taken again.
@@ -48,7 +53,7 @@ DENSITY_OF_NO_MISTAKE = -30.0
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
-    """Another way to understand all views, how well it explains them, and ways that do so as well."""
+    """Another way to understand all views, how well it explains them, and other kinds that do so as well."""
 
     hypothesis: Hypothesis
     explanation: Explanation
@@ -58,12 +63,16 @@ class Alternative:
 
 def find_alternative(measurements: Measurements, given: Explanation | None) -> Alternative | None:
     """Find another way to understand all views that explains them much better, None if there is none."""
-    bearable = given is not None and given.constants_are_bearable
-    needed = given.log_evidence + CLEARLY_BETTER if given is not None and bearable else -math.inf
+    compared = given is not None and given.has_evidence
+    needed = given.log_evidence + CLEARLY_BETTER if given is not None and compared else -math.inf
+    if given is not None and given.is_convincing:
+        tried = _even_so(measurements)
+    else:
+        tried = [*_promising(measurements), *_paired(measurements, given)]
     found: list[Alternative] = []
-    for hypothesis in [*_promising(measurements), *_paired(measurements, given)]:
+    for hypothesis in tried:
         try:
-            explanation = explain(hypothesis.applied(measurements))
+            explanation = explain(_applied(hypothesis, measurements))
         except HandeyeError:
             continue
         evidence = explanation.log_evidence + hypothesis.log_prior + hypothesis.log_unit
@@ -72,7 +81,13 @@ def find_alternative(measurements: Measurements, given: Explanation | None) -> A
     if not found:
         return None
     best = max(found, key=lambda alternative: alternative.log_evidence)
-    close = [a.hypothesis for a in found if a is not best and a.log_evidence > best.log_evidence - AS_WELL]
+    others = [a for a in found if a.hypothesis.kind is not best.hypothesis.kind]
+    close = [
+        other.hypothesis
+        for other in others
+        if other.log_evidence > best.log_evidence - AS_WELL
+        or (other.hypothesis.is_mirror and best.hypothesis.is_mirror)
+    ]
     return replace(best, rivals=tuple(close))
 
 
@@ -90,7 +105,7 @@ def refuse_alternative(
         raise _told(measurements, given, alternative)
     if given is None:
         raise inconsistent.error(0, len(measurements), math.inf, math.inf)
-    if not given.is_bearable:
+    if not given.is_bearable_alone:
         raise inconsistent.error(int(given.members.sum()), len(given.members), *given.levels)
     return given
 
@@ -113,14 +128,16 @@ def _told(
         if given is not None
         else ""
     )
-    rivals = [rival.sentence for rival in alternative.rivals if rival.kind is not hypothesis.kind]
-    as_well = f"; as well it may be that {' or that '.join(rivals[:MOST_RIVALS])}" if rivals else ""
+    rivals = alternative.rivals[:MOST_RIVALS]
+    sentences = " or that ".join(rival.sentence for rival in rivals)
+    as_well = f"; as well it may be that {sentences}" if rivals else ""
     return SharedFaultError(
         f"{sentence}: read so, {numbers['agreeing']} of {numbers['views']} views agree within "
         f"{numbers['robot_translation_mm']:.2g} mm and {numbers['robot_rotation_deg']:.2g} deg"
         f"{apart}{as_well}",
         hypothesis,
         hint=hint,
+        as_well=tuple(rival.kind.code for rival in rivals),
     )
 
 
@@ -147,6 +164,22 @@ def comparison(explanation: Explanation, given: Explanation | None) -> dict[str,
     return numbers
 
 
+def _even_so(measurements: Measurements) -> list[Hypothesis]:
+    """Return what may be meant where the views agree as given: motions of few kinds agree with several.
+
+    Turns about two axes through one place may be read backwards, and turns about a point at one distance
+    leave the size of the board to small deviations.
+    """
+    views, seen = measurements.motions, measurements.camera_poses
+    limit = NEARLY * _misfit(views, seen, measurements)
+    backwards = (
+        wrong_direction.hypotheses(measurements)
+        if _misfit(inverted(views), seen, measurements) < limit
+        else ()
+    )
+    return [*backwards, *board_size.hypotheses(measurements, smallest=BEARABLE_SCALE)]
+
+
 def _promising(measurements: Measurements) -> list[Hypothesis]:
     """Return the hypotheses under which X and Y in closed form miss least, of equals the more usual."""
     limit = BETTER_SHARE * _misfit(measurements.motions, measurements.camera_poses, measurements)
@@ -168,7 +201,7 @@ def _promising(measurements: Measurements) -> list[Hypothesis]:
                     inverted(meant) if in_hand else meant, measurements.camera_poses, measurements
                 )
             else:
-                changed = hypothesis.applied(measurements)
+                changed = _applied(hypothesis, measurements)
                 misfit = _misfit(changed.motions, changed.camera_poses, changed)
         except (HandeyeError, np.linalg.LinAlgError):
             continue
@@ -176,6 +209,14 @@ def _promising(measurements: Measurements) -> list[Hypothesis]:
             ranked.append((misfit, -hypothesis.log_prior, number, hypothesis))
     ranked.sort(key=lambda entry: (round(math.log(max(entry[0], 1e-12)), 3), entry[1], entry[2]))
     return _different(ranked)
+
+
+def _applied(hypothesis: Hypothesis, measurements: Measurements) -> Measurements:
+    """Return the measurements as they would be meant; raises `SolveError` where few views have a pose so."""
+    changed = hypothesis.applied(measurements)
+    if len(changed) < max(FEWEST_VIEWS, math.ceil(len(measurements) / 2)):
+        raise SolveError(f"{hypothesis.name}: {len(changed)} of {len(measurements)} views show the target")
+    return changed
 
 
 def _different(ranked: Sequence[tuple[float, float, int, Hypothesis]]) -> list[Hypothesis]:

@@ -46,6 +46,8 @@ def diagnose(recording: Recording) -> Diagnosis:
         except SharedFaultError as error:
             refused = refused or error
             findings.append(_finding(error))
+            if error.as_well:  # Which of them to put right is not for us to say.
+                return Diagnosis(tuple(findings), refused, None, None)
             current = error.hypothesis.change(current)
         except HandeyeError as error:
             return Diagnosis((*findings, _finding(error)), refused or error, None, None)
@@ -58,4 +60,5 @@ def diagnose(recording: Recording) -> Diagnosis:
 
 
 def _finding(error: HandeyeError) -> Finding:
-    return Finding(error.code, error.message, {"views": []})
+    as_well = list(error.as_well) if isinstance(error, SharedFaultError) else []
+    return Finding(error.code, error.message, {"views": [], "as_well": as_well})

@@ -98,8 +98,8 @@ def examine(measurements: Measurements) -> Examination:
     explanation = _explained(measurements)
     if explanation is None or not explanation.is_convincing:
         examine_pictures(measurements, closely=True)
-        alternative = find_alternative(measurements, explanation)
-        explanation = refuse_alternative(measurements, explanation, alternative)
+    alternative = find_alternative(measurements, explanation)
+    explanation = refuse_alternative(measurements, explanation, alternative)
     examination = _sort_out(measurements, explanation)
     return replace(examination, findings=(*findings, *examination.findings))
 

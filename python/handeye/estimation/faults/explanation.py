@@ -25,6 +25,11 @@ PINHOLE_PARAMETERS = 4
 # No healthy cell has a board whose size is off by more, or a camera off by such a share of its focal length.
 BEARABLE_SCALE = 0.03
 BEARABLE_CAMERA = 0.03
+# Where no other reading explains the views at all, both may be off by so many times as much: a coarse arm
+# says no better how large its board is.
+BEARABLE_ALONE = 2.0
+# Beyond such a level of the robot's noise the evidence is rounding.
+LARGEST_LEVEL_M = 10.0
 # Few views agree by chance sooner: more is asked of them.
 FEW_VIEWS = 5
 FEW_LEVELS = (1e-3, float(np.deg2rad(0.1)))
@@ -66,30 +71,42 @@ class Explanation:
     def is_convincing(self) -> bool:
         """Whether there is no reason to look for another."""
         few = len(self.members) <= FEW_VIEWS
-        return self._within(CONVINCING_SHARE, 4, FEW_LEVELS if few else CONVINCING_LEVELS)
+        levels = FEW_LEVELS if few else CONVINCING_LEVELS
+        return self.constants_are_bearable() and self._within(CONVINCING_SHARE, 4, levels)
 
     @property
     def is_bearable(self) -> bool:
         """Whether it explains the views at all."""
+        return self.constants_are_bearable() and self._stands
+
+    @property
+    def is_bearable_alone(self) -> bool:
+        """Whether it explains the views where nothing else does."""
+        return self.constants_are_bearable(BEARABLE_ALONE) and self._stands
+
+    @property
+    def has_evidence(self) -> bool:
+        """Whether its evidence is more than rounding and may be compared."""
+        return self.constants_are_bearable() and self.levels[0] < LARGEST_LEVEL_M
+
+    @property
+    def _stands(self) -> bool:
         # Three of four agree easily: six numbers more than unknowns.
         few = int(self.members.sum()) < min(4, len(self.members))
         return self._within(BEARABLE_SHARE, 3, FEW_LEVELS if few else BEARABLE_LEVELS)
 
-    @property
-    def constants_are_bearable(self) -> bool:
-        """Whether board and camera are about as they are stated."""
+    def constants_are_bearable(self, times: float = 1.0) -> bool:
+        """Tell whether board and camera are about as they are stated, or within so many times of that."""
         fit, camera = self.selection.fit, self.stations.camera
         shift = fit.camera_shift[np.array(camera.free, dtype=int) < PINHOLE_PARAMETERS]
-        limit = BEARABLE_CAMERA * camera.camera.parameters[0]
-        return abs(fit.board_scale) < BEARABLE_SCALE and bool((np.abs(shift) < limit).all())
+        limit = times * BEARABLE_CAMERA * camera.camera.parameters[0]
+        return abs(fit.board_scale) < times * BEARABLE_SCALE and bool((np.abs(shift) < limit).all())
 
     def _within(self, share: float, fewest: int, levels: tuple[float, float]) -> bool:
         """Tell whether so many of the views agree, and within these levels."""
         count = len(self.members)
         needed = max(share * count, min(count, fewest))
         translation, rotation = self.levels
-        if not self.constants_are_bearable:
-            return False
         return int(self.members.sum()) >= needed and translation <= levels[0] and rotation <= levels[1]
 
 

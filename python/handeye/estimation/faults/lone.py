@@ -22,6 +22,8 @@ MOVING_ROTATION_RAD = np.deg2rad(2.0)
 # share.
 ALONG_COSINE = 0.95
 MOST_OF_THE_WAY = 0.3
+# A shift or a turn of less than so many standard deviations has no direction.
+SHORTEST_SIGMAS = 3.0
 
 
 def view_evidence(explanation: Explanation, k: int) -> dict[str, Any]:
@@ -99,6 +101,9 @@ def _on_the_way(
     # The robot pose that the image asks for, from the other views.
     asked = inverted(agreement.X) @ stations.poses[k] @ inverted(agreement.Y)
     # T_base_flange of A, and of what the image asks for.
+    _, covariance = agreement.at_flange(explanation.selection.fit)
+    variance = np.diag(covariance[k])
+    sigmas = np.sqrt([variance[:3].sum(), variance[3:].sum()])
     in_hand = measurements.mounting is Mounting.EYE_IN_HAND
     flanges = inverted(stations.motions) if in_hand else stations.motions
     wanted = inverted(asked) if in_hand else asked
@@ -106,21 +111,32 @@ def _on_the_way(
         if not 0 <= other < len(measurements):
             continue
         for at_rest, moving in ((flanges[k], wanted), (wanted, flanges[k])):
-            share = _share_of_way(at_rest, moving, flanges[other])
+            share = _share_of_way(at_rest, moving, flanges[other], sigmas)
             if share is not None:
                 return measurements.views[other].name, share, moving is wanted
     return None
 
 
-def _share_of_way(start: FloatArray, between: FloatArray, end: FloatArray) -> float | None:
-    """Share of the way from a pose to another at which a third lies; None if it lies elsewhere."""
-    moved = twists((inverted(start) @ between)[np.newaxis])[0]
-    way = twists((inverted(start) @ end)[np.newaxis])[0]
-    shares = [_share(moved[part], way[part]) for part in (slice(0, 3), slice(3, 6))]
-    first, second = (0.0 if share is None else share for share in shares)
-    if 0 < max(first, second) < MOST_OF_THE_WAY and max(first, second) < 1.5 * min(first, second):
-        return 0.5 * (first + second)
-    return None
+def _share_of_way(
+    start: FloatArray, between: FloatArray, end: FloatArray, sigmas: FloatArray
+) -> float | None:
+    """Share of the way from a pose to another at which a third lies; None if it lies elsewhere.
+
+    `sigmas` (2,) are standard deviations of shift and turn. Where one of them is too small to have a
+    direction, it must be what the share of the other leaves.
+    """
+    moved = twists((inverted(start) @ between)[np.newaxis])[0].reshape(2, 3)
+    way = twists((inverted(start) @ end)[np.newaxis])[0].reshape(2, 3)
+    clear = np.linalg.norm(moved, axis=1) > SHORTEST_SIGMAS * sigmas
+    shares = [_share(moved[part], way[part]) for part in np.flatnonzero(clear)]
+    if not shares or None in shares:
+        return None
+    known = np.array(shares, dtype=np.float64)
+    share = float(known.mean())
+    left = np.linalg.norm(moved - share * way, axis=1)
+    if known.max() >= min(MOST_OF_THE_WAY, 1.5 * known.min()) and len(known) > 1:
+        return None
+    return share if share < MOST_OF_THE_WAY and (clear | (left < SHORTEST_SIGMAS * sigmas)).all() else None
 
 
 def _share(moved: FloatArray, way: FloatArray) -> float | None:

@@ -34,7 +34,7 @@ impl Component for Links {
                 start: 1e-4 * self.roughness,
                 prior: LevelPrior::Deviation {
                     size: 7e-4 * self.roughness,
-                    exponent: 0.42,
+                    exponent: 0.6,
                     tail: 1.0,
                     nothing: 1e-8,
                 },
@@ -44,7 +44,7 @@ impl Component for Links {
                 start: 0.005 * degree * self.roughness,
                 prior: LevelPrior::Deviation {
                     size: 0.04 * degree * self.roughness,
-                    exponent: 0.42,
+                    exponent: 0.6,
                     tail: 1.0,
                     nothing: 1e-6 * degree,
                 },

@@ -73,6 +73,9 @@ class Hypothesis:
         What that does to the robot's poses (K, 4, 4) `T_base_flange`, where it changes nothing else.
     log_prior
         Logarithm of how much less usual it is than the others.
+    is_mirror
+        Whether a mirror image is put right. Whether of the pictures or of the robot's frame, only the
+        camera's centre tells, which is not known as well as that: nothing does.
     log_unit
         Logarithm of the factor between the densities of a view as meant and as given: the cube of that
         between their lengths.
@@ -85,6 +88,7 @@ class Hypothesis:
     change: Callable[[Recording], Recording]
     poses: Callable[[FloatArray], FloatArray] | None = None
     log_prior: float = 0.0
+    is_mirror: bool = False
     log_unit: float = 0.0
 
     def applied(self, measurements: Measurements) -> Measurements:
@@ -106,11 +110,15 @@ class SharedFaultError(InputError):
     ----------
     hypothesis
         The fault, with the change from the recording as given to the one that was meant.
+    as_well
+        Codes of other kinds that explain the views as well: the views cannot tell which it is.
     """
 
-    def __init__(self, message: str, hypothesis: Hypothesis, *, hint: str | None = None) -> None:
+    def __init__(
+        self, message: str, hypothesis: Hypothesis, *, hint: str | None = None, as_well: tuple[str, ...] = ()
+    ) -> None:
         super().__init__(message, code=hypothesis.kind.code, hint=hint or hypothesis.hint)
-        self.hypothesis = hypothesis
+        self.hypothesis, self.as_well = hypothesis, as_well
 
 
 def of_poses(
@@ -121,6 +129,7 @@ def of_poses(
     poses: Callable[[FloatArray], FloatArray],
     *,
     log_prior: float = 0.0,
+    is_mirror: bool = False,
 ) -> Hypothesis:
     """Return the hypothesis that the robot's poses are to be read in another way."""
 
@@ -132,7 +141,7 @@ def of_poses(
             for view, matrix in zip(recording.views, meant, strict=True)
         )
 
-    return Hypothesis(kind, name, sentence, hint, change, poses, log_prior)
+    return Hypothesis(kind, name, sentence, hint, change, poses, log_prior, is_mirror)
 
 
 def _same_points(one: View, other: View) -> bool:

@@ -22,16 +22,28 @@ KIND = Kind(
 )
 # Nearer to one the scale of the board is a parameter of the estimate.
 SMALLEST_ERROR = 0.01
+# Views that hardly turn say anything of its size.
+LARGEST_FACTOR = 30.0
 # A factor of any value is less probable beforehand than a unit's, by this logarithm.
 ANY_SCALE = -8.0
 
 
-def hypotheses(measurements: Measurements) -> Iterator[Hypothesis]:
-    """Yield the size of the board that fits the robot's motions."""
-    factor = scale_of(measurements)
-    if factor is None or abs(math.log(factor)) < math.log1p(SMALLEST_ERROR):
+# The motions' size leans to one side where noise of the rotations is mistaken for a change of distance: parts
+# of the way to it are tried too.
+SHARES = (1.0, 0.75, 0.5)
+
+
+def hypotheses(measurements: Measurements, smallest: float = SMALLEST_ERROR) -> Iterator[Hypothesis]:
+    """Yield sizes of the board that fit the robot's motions, where they are off by `smallest` or more."""
+    whole = scale_of(measurements)
+    if whole is None or not math.log1p(smallest) <= abs(math.log(whole)) < math.log(LARGEST_FACTOR):
         return
-    yield Hypothesis(
+    for share in SHARES:
+        yield _of_size(whole**share)
+
+
+def _of_size(factor: float) -> Hypothesis:
+    return Hypothesis(
         KIND,
         "size",
         f"the target is {factor:.4g} times as large as stated, going by the robot's motions",

@@ -17,8 +17,11 @@ KIND = Kind(
     "A driver or a program flips the pictures, as for a selfie.",
     "A flipped picture shows a board that turns the other way: with the pixels flipped back all views agree.",
     Handling.REFUSED,
-    "Switch the flip off (`ReverseX`, `cv2.flip`) and take the pictures again, or flip them back.",
-    "writes the points where they are in the pictures flipped back; pictures themselves are left out",
+    "Look at a picture: letters that read from right to left are mirrored. Then switch the flip off "
+    "(`ReverseX`, `cv2.flip`) and take the pictures again, or flip them back. Else the robot's frame is "
+    "left-handed.",
+    "writes nothing where a left-handed frame of the robot explains the views as well: only a look at a "
+    "picture tells",
 )
 # What is done in pictures seldom, by this logarithm.
 SELDOM = -2.0
@@ -32,9 +35,11 @@ def hypotheses(measurements: Measurements) -> Iterator[Hypothesis]:
             KIND,
             f"flipped_{'xy'[axis]}",
             f"the pictures are mirrored ({words})",
-            "switch the flip of the camera's driver off and take the pictures again, or flip them back",
+            "if letters in a picture read from right to left, switch the flip of the camera's driver off and "
+            "take the pictures again, or flip them back; else turn one axis of the robot's poses round",
             partial(flipped, axis=axis),
             log_prior=SELDOM,
+            is_mirror=True,
         )
 
 

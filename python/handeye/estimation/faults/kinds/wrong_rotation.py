@@ -61,6 +61,7 @@ def hypotheses(measurements: Measurements) -> Iterator[Hypothesis]:
             HINT,
             partial(_left_handed, axis=axis),
             log_prior=SELDOM,
+            is_mirror=True,
         )
     for signs, which in _SIGNS:
         yield of_poses(
