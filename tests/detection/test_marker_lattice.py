@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from handeye.detection import marker_lattice
+from handeye.detection.marker_reading import Reading
 
 
 def test_places_beside_markers_that_give_no_map_are_in_no_picture(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -22,3 +23,14 @@ def test_places_beside_markers_that_give_no_map_are_in_no_picture(monkeypatch: p
     beside = np.array([[2, 0], [2, 1]])
     found = marker_lattice._in_picture(beside, cast("Any", lattice), (640, 480))
     np.testing.assert_array_equal(found, [False, False])
+
+
+def test_a_marker_turned_half_around_is_not_beside_another() -> None:
+    """The mean of their axes is nothing; that ended the search with a singular matrix."""
+    square = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]])
+    right = np.array([15.0, 0])
+    corners = np.stack([square, square + right, np.roll(square, 2, axis=0) + 2 * right])
+    nothing = np.zeros(0, dtype=np.int64)
+    reading = Reading("DICT_4X4_1000", 1, False, np.array([4, 5, 6]), corners, nothing)
+    lattices = marker_lattice.lattices_of(reading)
+    assert [lattice.ids.tolist() for lattice in lattices] == [[4, 5], [6]]

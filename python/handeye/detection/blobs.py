@@ -118,14 +118,20 @@ def _merged(rows: FloatArray) -> Spots:
     free = np.ones(len(rows), dtype=bool)
     kept: list[int] = []
     levels: list[int] = []
+    # Only those beside it in x can be the same.
+    by_x = np.argsort(rows[:, 0], kind="stable")
+    x, reach = rows[by_x, 0], SAME_SPOT * radii
+    first, last = np.searchsorted(x, rows[:, 0] - reach), np.searchsorted(x, rows[:, 0] + reach, "right")
     for index in range(len(rows)):
         if not free[index]:
             continue
-        distance = np.hypot(*(rows[:, :2] - rows[index, :2]).T)
-        same = free & (distance <= SAME_SPOT * np.minimum(radii, radii[index]))
-        same &= np.abs(np.log(radii / radii[index])) <= np.log(SAME_RADIUS)
-        free &= ~same
-        members = np.flatnonzero(same)
+        near = by_x[first[index] : last[index]]
+        near = np.sort(near[free[near]])
+        distance = np.hypot(*(rows[near, :2] - rows[index, :2]).T)
+        same = distance <= np.minimum(reach[near], reach[index])
+        same &= np.abs(np.log(radii[near] / radii[index])) <= np.log(SAME_RADIUS)
+        members = near[same]
+        free[members] = False
         if len(members) >= FEWEST_LEVELS:
             kept.append(int(members[np.argsort(radii[members])[len(members) // 2]]))
             levels.append(len(members))

@@ -23,6 +23,7 @@ from handeye.detection.corner_fit import (
     CornerKind,
     astray,
     corner_fits,
+    curvatures,
     nearer,
     spread,
 )
@@ -121,7 +122,8 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         lens = _core.PlaneMap.fitted(plane, rough) if len(rough) >= FEWEST_CORNERS else None
         if lens is not None:
             steps = lens.steps(plane, 0.1 * target.square_m)
-        sharp = _measured(image, target, rough, steps)
+        bends = curvatures(lens, plane, target.square_m)
+        sharp = _measured(image, target, rough, steps, bends)
         good = np.flatnonzero(~sharp.spoilt())
         # What lies in front of the board has edges, too: markers and corners around know better.
         around = np.concatenate([sharp.places[good], seen.reshape(-1, 2)])
@@ -161,7 +163,8 @@ def confirm(image: Image, target: Charuco, board: Aligned) -> Detection | None:
     near = _measured(image, target, corners[some], steps[some], rough=True).places
     # Then it is known well enough where all are, so that where they were put matters no more.
     again, steps = nearer(plane, corners, steps, some, near)
-    sharp = _measured(image, target, again, steps)
+    bends = curvatures(_core.PlaneMap.fitted(plane, again), plane, target.square_m)
+    sharp = _measured(image, target, again, steps, bends)
     good = ~sharp.spoilt() & ~astray(
         sharp.places, corners, target.square_m * np.linalg.norm(steps, axis=2).min(axis=1)
     )
@@ -184,9 +187,14 @@ def _steps(corners: FloatArray, places: FloatArray, markers: FloatArray) -> Floa
 
 
 def _measured(
-    image: Image, target: Charuco, corners: FloatArray, steps: FloatArray, rough: bool = False
+    image: Image,
+    target: Charuco,
+    corners: FloatArray,
+    steps: FloatArray,
+    bends: FloatArray | None = None,
+    rough: bool = False,
 ) -> CornerFits:
-    """Return the corners (N) as fitted."""
+    """Return the corners (N) as fitted; `bends` (N, 2) are the curvatures of the edges along both axes."""
     lengths = np.linalg.norm(steps, axis=2)
     directions = steps / lengths[:, :, np.newaxis]
     sine = np.abs(np.linalg.det(directions))
@@ -198,6 +206,7 @@ def _measured(
         directions,
         WINDOW_SHARE * target.square_m * scale,
         CornerKind.CROSSING,
+        bends,
         bands=BAND_SHARE * free * scale,
         rough=rough,
     )

@@ -82,6 +82,32 @@ def nearer(
     return np.where(good[:, np.newaxis], found, expected), directions
 
 
+def curvatures(lens: _core.PlaneMap | None, plane: FloatArray, half: float) -> FloatArray:
+    """Return the curvatures (N, 2) in 1 / px that straight lines along both axes have in the image.
+
+    They are towards the normals (-sin, cos) of the axes' directions; none without a map of the plane.
+
+    Parameters
+    ----------
+    lens
+        The map.
+    plane
+        (N, 2) places in metres.
+    half
+        How far apart the places are by which it is told, in metres.
+    """
+    if lens is None or not len(plane):
+        return np.zeros((len(plane), 2))
+    here, bent = lens.pixels(plane), np.zeros((len(plane), 2))
+    for axis in range(2):
+        step = half * np.eye(2)[axis]
+        before, after = lens.pixels(plane - step), lens.pixels(plane + step)
+        along, turned = (after - before) / 2, after - 2 * here + before
+        cross = along[:, 0] * turned[:, 1] - along[:, 1] * turned[:, 0]
+        bent[:, axis] = cross / np.maximum(np.linalg.norm(along, axis=1), 1e-9) ** 3
+    return bent
+
+
 @dataclass(frozen=True, eq=False)
 class CornerFits:
     """Corners that were fitted, NaN where that failed.
@@ -106,7 +132,11 @@ class CornerFits:
     @property
     def sigmas_px(self) -> FloatArray:
         """(N,) standard deviations of the places, of one coordinate."""
-        return CORRELATED * self.misfits * np.sqrt(np.trace(self.spreads, axis1=1, axis2=2) / 2)
+        there = np.isfinite(self.misfits)
+        usual = float(np.median(self.misfits[there])) if there.any() else np.nan
+        # A smaller misfit than is usual in the picture comes of a window of few pixels, not of less noise.
+        misfits = np.maximum(self.misfits, usual)
+        return CORRELATED * misfits * np.sqrt(np.trace(self.spreads, axis1=1, axis2=2) / 2)
 
     def spoilt(self) -> NDArray[np.bool_]:
         """Tell which corners (N,) were not fitted, or not as well as the others: a shadow's edge or glare."""

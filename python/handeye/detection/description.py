@@ -11,7 +11,7 @@ from handeye.detection.base import Detection, Image, NotFound, Reason, upright
 from handeye.detection.blobs import find_spots
 from handeye.detection.lattice import grow
 from handeye.detection.marker_lattice import boards_like, lattices_of
-from handeye.detection.marker_reading import Reading, read_markers
+from handeye.detection.marker_reading import Reading, is_plain, read_markers
 from handeye.detection.markers import Seen
 from handeye.detection.part import Part
 from handeye.types import Charuco, Chessboard, CircleGrid, Target
@@ -103,6 +103,9 @@ def _visible(
     for look in without_markers[::-1] if isinstance(target, CircleGrid) else without_markers:
         for board in look(small, target):
             yield board, None
+    # One marker may belong to something else in the picture; it is what is shown where there is nothing else.
+    if reading is not None and not isinstance(target, Coded) and is_plain(reading, image.shape[::-1]):
+        yield from ((board, reading) for board in _marked(image, target, reading, 1))
 
 
 def _marked(image: Image, target: Target, reading: Reading, fewest: int) -> Iterator[Target]:

@@ -28,6 +28,8 @@ MORE_COLUMNS = 3
 FEWEST_OF_CHARUCO, ROOM = 3, 0.6
 # Markers that speak against a board; one may have been misread.
 FEWEST_AGAINST = 2
+# What the mean axes of two markers span, at least, as a share of what the sides of one of them make.
+LEAST_ALIKE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +76,11 @@ def lattices_of(reading: Reading, step: float | None = None) -> list[MarkerLatti
     # From marker i to j in sides of a marker, as the mean of what both say.
     both = (axes[:, np.newaxis] + axes) / 2
     flat = (centres - centres[:, np.newaxis])[:, :, np.newaxis]
+    # Markers that are turned against each other have no axes in common, and are not beside each other.
+    alike = np.abs(np.linalg.det(both)) > LEAST_ALIKE * np.prod(np.linalg.norm(axes, axis=2), axis=1)
+    both[~alike] = np.eye(2)
     steps = np.asarray(np.linalg.solve(both.swapaxes(2, 3), flat.swapaxes(2, 3)), dtype=np.float64)[..., 0]
-    away = np.abs(steps).max(axis=2)
+    away = np.where(alike, np.abs(steps).max(axis=2), np.inf)
     np.fill_diagonal(away, np.inf)
     unit = step or (float(np.median(away.min(axis=1))) if len(centres) > 1 else 1.0)
     lattices: list[MarkerLattice] = []

@@ -12,7 +12,7 @@ from handeye.detection.base import Image
 from handeye.detection.markers import SMALLEST_PERIMETER_SHARE, dictionary
 from handeye.detection.noise import calmed
 from handeye.types.arrays import FloatArray, IndexArray
-from handeye.types.target.dictionaries import marker_bits
+from handeye.types.target.dictionaries import marker_bits, marker_count
 
 # One of each kind; smaller dictionaries are beginnings of these.
 LARGEST = (
@@ -30,6 +30,8 @@ BORDER_ERRORS, CORRECTION = 0.06, 0.6
 FEWEST, FEWEST_OF_FOUR = 1, 3
 # Unless one is as large as this, as a share of the image.
 LARGE_SHARE = 0.08
+# Of a reading that is no chance; four of the smallest markers of 4 x 4 bits have as much.
+PLAIN_BITS = 16.0
 # Corners of outlines are off by so many pixels, or this share of a side.
 NEAR_PX, NEAR_SHARE = 5, 0.08
 _ENOUGH = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 20, 0.05)
@@ -95,8 +97,16 @@ def read_markers(image: Image, *, touched: bool = False) -> Reading | None:
     return replace(best, corners=_sharpened(image, best.corners))
 
 
-def _weight(reading: Reading) -> int:
-    return len(reading.ids)
+def _weight(reading: Reading) -> float:
+    """Return how many bits speak against chance: more markers, and fewer of the codes with a number."""
+    name = reading.dictionary
+    return len(reading.ids) * (marker_bits(name) ** 2 - np.log2(4 * marker_count(name)))
+
+
+def is_plain(reading: Reading, image_size: tuple[int, int]) -> bool:
+    """Tell whether markers are no chance even where none are expected: large, and of many bits."""
+    large = LARGE_SHARE * max(image_size)
+    return _weight(reading) >= PLAIN_BITS and bool(_sides(reading.corners).max() >= large)
 
 
 def _outermost(reading: Reading, others: dict[tuple[str, int, bool], Reading]) -> Reading:

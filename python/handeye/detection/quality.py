@@ -14,8 +14,8 @@ from handeye.types.arrays import FloatArray
 
 # Numbers of a homography; a lens adds polynomials of a degree, from so many points for each of their terms.
 OF_HOMOGRAPHY, DEGREES, POINTS_PER_TERM = 8, (6, 5, 4, 3), 1.9
-# What is usual counts as so many measurements.
-USUAL_COUNT = 2.0
+# What is usual counts as one measurement.
+USUAL_COUNT = 1.0
 # No point is better.
 LEAST_PX = 0.001
 # The largest of the squares are left out, as a few points may lie elsewhere; the mean of the others of a

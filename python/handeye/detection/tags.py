@@ -15,12 +15,14 @@ from handeye.detection.corner_fit import (
     CornerKind,
     astray,
     corner_fits,
+    curvatures,
     nearer,
     spread,
 )
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.edge_shift import unknown_shift_px, without_edge_shift
 from handeye.detection.marker_lattice import contradiction
+from handeye.detection.marker_sides import side_meetings
 from handeye.detection.markers import (
     LEAST_SHARE,
     NO_IDS,
@@ -31,20 +33,20 @@ from handeye.detection.markers import (
     from_neighbours,
 )
 from handeye.detection.registration import Aligned
-from handeye.detection.saddles import sampled
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.target import MarkerCorners
 from handeye.types.target.artwork import Squares
 from handeye.types.target.dictionaries import marker_bits
 
-# Part of the space between tags that the window of a corner may take, and of the border that its strips may.
-WINDOW_SHARE = 0.8
+# How far the window of a corner stays from the next edge, which is blurred, too: so many pixels, but at least
+# and at most these shares of the space between markers. And the part of the border that its strips may take.
+AWAY_PX, LEAST_AWAY, MOST_AWAY = 4.5, 0.2, 0.4
 BAND_SHARE = 0.8
 # Tags read where they are expected.
 FEWEST_TAGS = 2
-# A side of a marker is dark on one side of a line, so far from it, at so many of its places, this share of
-# the usual step or more.
-SIDE_SAMPLES, ASIDE_PX, SIDE_SHARE, SIDE_CONTRAST = 24, 2.0, 0.8, 0.3
+# So many markers do not tell which of their corners is none, but their sides do; fitted corners are no
+# further from where sides meet than this many of the latter's deviations.
+FEW_MARKERS, MEETING_SIGMAS = 3, 3.0
 # Tried until all tags are found, the last only if some are; one leaves the ink as it is.
 THINNING_PX = (3, 1, 5)
 
@@ -78,7 +80,9 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
     astray = np.linalg.norm(expected - seen.reshape(-1, 2), axis=1) > ASTRAY_PX
     seen = np.where(astray[:, np.newaxis], expected, seen.reshape(-1, 2)).reshape(-1, 4, 2)
     side = _side(target)
-    rough = _measured(image, target, tags, seen, None, rough=True).places
+    near = _measured(image, target, tags, seen, None, rough=True)
+    is_few = len(tags) <= FEW_MARKERS
+    rough = _by_sides(image, target, seen, near)[0] if is_few else near.places
     good = np.flatnonzero(np.isfinite(rough[:, 0]))
     lens = _core.PlaneMap.fitted(plane[good], rough[good]) if len(good) >= 4 else None
     if lens is None:
@@ -86,16 +90,19 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
     # Once more: all corners together tell the directions of edges better than a tag does.
     again = np.where(np.isfinite(rough), rough, seen.reshape(-1, 2)).reshape(-1, 4, 2)
     steps = lens.steps(plane, 0.1 * side)
-    fits = _measured(image, target, tags, again, steps)
-    good = np.flatnonzero(np.isfinite(rough[:, 0]) & ~fits.spoilt())
-    expected = from_neighbours(plane[good], fits.places[good])
-    good = good[np.linalg.norm(expected - fits.places[good], axis=1) <= ASTRAY_PX]
+    fits = _measured(image, target, tags, again, steps, lens)
+    places, sigmas = fits.places, fits.sigmas_px
+    if is_few:
+        places, sigmas = _by_sides(image, target, again, fits)
+        good = np.flatnonzero(np.isfinite(rough[:, 0]) & np.isfinite(places[:, 0]))
+    else:
+        good = np.flatnonzero(np.isfinite(rough[:, 0]) & ~fits.spoilt())
+    expected = from_neighbours(plane[good], places[good])
+    good = good[np.linalg.norm(expected - places[good], axis=1) <= ASTRAY_PX]
     if len(good) < 4:
         return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
-    if len(tags) == 1 and not _has_sides(image, fits.places):
-        return NotFound(Reason.INCOMPLETE, "the marker is seen, but something covers a corner of it")
-    sharp = without_edge_shift(plane[good], fits.places[good], _sides(target, tags, steps)[good])
-    sigmas = np.hypot(fits.sigmas_px[good], unknown_shift_px(len(good)))
+    sharp = without_edge_shift(plane[good], places[good], _unit(_sides(target, tags) @ steps)[good])
+    sigmas = np.hypot(sigmas[good], unknown_shift_px(len(good)))
     return ordered(target, points.ravel()[good], sharp, sigmas)
 
 
@@ -117,13 +124,18 @@ def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | 
     near = _measured(image, target, tags[few], places[read][few], steps[some], rough=True).places
     # Then it is known well enough where all are, so that where they were put matters no more.
     again, steps = nearer(plane, corners, steps, some, near)
-    fits = _measured(image, target, tags, again.reshape(-1, 4, 2), steps)
-    good = ~fits.spoilt() & ~astray(fits.places, corners, side * np.linalg.norm(steps, axis=2).min(axis=1))
+    lens = _core.PlaneMap.fitted(plane, again)
+    fits = _measured(image, target, tags, again.reshape(-1, 4, 2), steps, lens)
+    places_px, sigmas = fits.places, fits.sigmas_px
+    good = ~fits.spoilt()
+    if len(tags) <= FEW_MARKERS:
+        places_px, sigmas = _by_sides(image, target, again.reshape(-1, 4, 2), fits)
+        good = np.isfinite(places_px[:, 0])
+    good &= ~astray(places_px, corners, side * np.linalg.norm(steps, axis=2).min(axis=1))
     if good.sum() < max(4, LEAST_SHARE * 4 * expected.sum()):
         return None
-    sharp = without_edge_shift(plane[good], fits.places[good], _sides(target, tags, steps)[good])
-    sigmas = np.hypot(fits.sigmas_px[good], unknown_shift_px(len(good)))
-    return ordered(target, ids[good], sharp, sigmas)
+    sharp = without_edge_shift(plane[good], places_px[good], _unit(_sides(target, tags) @ steps)[good])
+    return ordered(target, ids[good], sharp, np.hypot(sigmas[good], unknown_shift_px(len(good))))
 
 
 def _markers(image: Image, target: MarkerCorners) -> Seen:
@@ -154,21 +166,22 @@ def _markers(image: Image, target: MarkerCorners) -> Seen:
     return Seen(ids[once], seen[once], repeated)
 
 
-def _has_sides(image: Image, corners: FloatArray) -> bool:
-    """Tell whether the sides between the corners (4, 2) of a marker are its edges, from corner to corner.
+def _by_sides(
+    image: Image, target: MarkerCorners, corners: FloatArray, fits: CornerFits
+) -> tuple[FloatArray, FloatArray]:
+    """Return corners (4 M, 2) of few markers as fitted where their sides meet, and deviations (4 M,).
 
-    Other markers would tell that a corner is not where it should be; of a single one the sides do.
+    Elsewhere the window shows something else, so that the sides count; NaN where those do not tell. Corners
+    (M, 4, 2) are about where they are.
     """
-    before, after = corners, np.roll(corners, -1, axis=0)
-    along = np.linspace(0.05, 0.95, SIDE_SAMPLES)[:, np.newaxis]
-    line = before[:, np.newaxis] + along * (after - before)[:, np.newaxis]
-    across = (after - before)[:, ::-1] * [1.0, -1.0]
-    across *= (ASIDE_PX / np.maximum(np.linalg.norm(across, axis=1), 1e-9))[:, np.newaxis]
-    # Outwards, whichever way the corners go around.
-    across *= np.sign(((line.mean(axis=1) - corners.mean(axis=0)) * across).sum(axis=1))[:, np.newaxis]
-    step = sampled(image, line + across[:, np.newaxis]) - sampled(image, line - across[:, np.newaxis])
-    is_edge = step >= SIDE_CONTRAST * max(float(np.median(step)), 0.0)
-    return bool((is_edge & (step > 0)).mean(axis=1).min() >= SIDE_SHARE)
+    if not len(corners):
+        return fits.places, fits.sigmas_px
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    meetings = side_meetings(image, corners, BAND_SHARE * _border(target) * float(lengths.min()))
+    places, sigmas = meetings.places.reshape(-1, 2), meetings.sigmas_px.ravel()
+    away = np.linalg.norm(fits.places - places, axis=1)
+    agree = ~fits.spoilt() & (away <= np.maximum(ASTRAY_PX, MEETING_SIGMAS * sigmas))
+    return np.where(agree[:, np.newaxis], fits.places, places), np.where(agree, fits.sigmas_px, sigmas)
 
 
 def _side(target: MarkerCorners) -> float:
@@ -182,14 +195,14 @@ def _border(target: MarkerCorners) -> float:
     return min(target.border_bits / cells, target.gap_m / _side(target))
 
 
-def _sides(target: MarkerCorners, markers: IndexArray, steps: FloatArray) -> FloatArray:
-    """Return the directions (4 M, 2, 2) in the image of both sides that begin at each corner of markers (M,).
-
-    `steps` (4 M, 2, 2) are the pixels per metre along both axes there.
-    """
+def _sides(target: MarkerCorners, markers: IndexArray) -> FloatArray:
+    """Return the directions (4 M, 2, 2) on the board of both sides at each corner of markers (M,)."""
     plane = target.points[:, :2].reshape(-1, 4, 2)[markers]
     sides = np.stack([np.roll(plane, -1, axis=1) - plane, np.roll(plane, 1, axis=1) - plane], axis=2)
-    directions = sides.reshape(-1, 2, 2) @ steps
+    return sides.reshape(-1, 2, 2) / _side(target)
+
+
+def _unit(directions: FloatArray) -> FloatArray:
     return directions / np.linalg.norm(directions, axis=2, keepdims=True)
 
 
@@ -199,27 +212,32 @@ def _measured(
     markers: IndexArray,
     tags: FloatArray,
     steps: FloatArray | None,
+    lens: _core.PlaneMap | None = None,
     rough: bool = False,
 ) -> CornerFits:
     """Return the corners (4 M) of markers (M,) with corners (M, 4, 2) as fitted.
 
     The directions of the edges are those of the outlines, or, if it is known, those that the pixels
-    (4 M, 2, 2) per metre along both axes tell.
+    (4 M, 2, 2) per metre along both axes tell; how the lens bends them, its map of the plane.
     """
     after = np.roll(tags, -1, axis=1) - tags
     before = np.roll(tags, 1, axis=1) - tags
     lengths = np.minimum(np.linalg.norm(after, axis=2), np.linalg.norm(before, axis=2)).reshape(-1)
     directions = np.stack([after, before], axis=2).reshape(-1, 2, 2)
-    directions = directions / np.linalg.norm(directions, axis=2, keepdims=True)
-    if steps is not None:
-        directions = _sides(target, markers, steps)
+    sides = _sides(target, markers)
+    directions = _unit(directions if steps is None else sides @ steps)
+    plane = target.points[:, :2].reshape(-1, 4, 2)[markers].reshape(-1, 2)
+    # Sides run along the axes of the board, or against them.
+    bends = (sides @ curvatures(lens, plane, target.spacing_m)[:, :, np.newaxis])[..., 0]
     height = lengths * np.abs(np.linalg.det(directions))
+    free = target.gap_m / _side(target) * height
     return corner_fits(
         image,
         tags.reshape(-1, 2),
         directions,
-        WINDOW_SHARE * target.gap_m / _side(target) * height,
+        free - np.clip(AWAY_PX, LEAST_AWAY * free, MOST_AWAY * free),
         CornerKind.QUADRANTS,
+        bends,
         bands=BAND_SHARE * _border(target) * height,
         rough=rough,
     )
