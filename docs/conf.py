@@ -31,15 +31,18 @@ html_copy_source = False
 html_theme_options = {"navigation_with_keys": True}
 
 
-def levels_of_captions(app: Sphinx, name: str, template: str, context: dict[str, Any], *rest: object) -> None:
-    """Say of captions, which are headings to a screen reader, of which level they are."""
+def mended(app: Sphinx, name: str, template: str, context: dict[str, Any], *rest: object) -> None:
+    """Say of captions, headings to a screen reader, of which level they are; let keys reach what scrolls."""
     del app, name, template, rest
     plain = '<p class="caption" role="heading">'
     for part in ("furo_navigation_tree", "body"):
         if text := context.get(part):
-            context[part] = text.replace(plain, plain[:-1] + ' aria-level="2">')
+            text = text.replace(plain, plain[:-1] + ' aria-level="2">')
+            text = text.replace("<pre>", '<pre tabindex="0">')
+            text = text.replace('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper')
+            context[part] = text
 
 
 def setup(app: Sphinx) -> None:
     """Come after the theme, which makes the side bar."""
-    app.connect("html-page-context", levels_of_captions, priority=900)
+    app.connect("html-page-context", mended, priority=900)

@@ -22,7 +22,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
 from types import FrameType
@@ -30,25 +30,28 @@ from types import FrameType
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "datasets"))
-
-from layouts import some_recording, write_rct, write_rwhe
 
 from bags_written import Journey
 from bags_written import write as write_bag
+from cli.test_verify import touched
+from datasets.layouts import some_recording, write_rct, write_rwhe
+from datasets.test_hostile import poses_alone
 from folders import made_recording, photographed, written
 from handeye.cli.boundary import run as run_command
 from handeye.datasets import read_camera, read_poses, read_recording, read_rig, read_target, write_rig
 from handeye.datasets.images import read_image
+from handeye.datasets.touches import read_touches
 from handeye.errors import HandeyeError
 from handeye.export.result import read_result
-from handeye.importing import SourceOptions, open_folder
+from handeye.importing import SourceOptions, open_any, open_folder
 from handeye.notations import NOTATIONS, read_pose_text
 from handeye.robots import open_arm
 from handeye.robots.shapes import read_shapes
+from handeye.session.rig_store import open_rig_session
 from handeye.session.store import open_session
 from handeye.types import Body, CameraView, MountedCamera, MountedTarget, RigRecording
-from sessions import configured
+from robots.test_mjcf import MJCF
+from sessions import RIG, configured, run_rig
 from sessions import run as run_session
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -81,7 +84,7 @@ def command(*before: str) -> Callable[[Path], object]:
     def call(path: Path) -> None:
         out, err = StringIO(), StringIO()
         with redirect_stdout(out), redirect_stderr(err):
-            code = run_command([*before, str(path), "--json"])
+            code = run_command([*before, str(path), "--json", "--debug"])
         if code == 1:
             raise AssertionError(f"exit code 1: {err.getvalue()[-1500:]}")
 
@@ -126,6 +129,16 @@ def session(path: Path) -> None:
     open_session(path).close()
 
 
+def rig_session(path: Path) -> None:
+    """Open a session with several cameras."""
+    open_rig_session(path).close()
+
+
+def dry_run(path: Path) -> None:
+    """Plan the first motions of an arm that a file describes."""
+    command("run", "--dry-run", "--session", str(path.parent / "none"), "--robot")(path)
+
+
 def examples(folder: Path) -> tuple[list[Example], list[Example]]:
     """Make the examples of readers and of commands."""
     recording = written(made_recording(5), folder / "recording")
@@ -140,7 +153,17 @@ def examples(folder: Path) -> tuple[list[Example], list[Example]]:
         *(Example(f"folder {path.name}", path, open_folder) for path in layouts),
     ]
     arms = sorted((ROOT / "python/handeye/robots/arms").glob("*.urdf"))
+    (folder / "three.xml").write_text(MJCF)
+    arms.append(folder / "three.xml")
     readers += [Example(f"arm {path.name}", path, arm_and_shapes) for path in arms]
+    (folder / "poses").mkdir()
+    made = list(poses_alone(folder / "poses").values())
+    readers += [Example(f"folder {path.name}", path, open_any) for path in made]
+    (folder / "touched").mkdir()
+    touched_recording, touches = touched(folder / "touched", 0.0)
+    readers.append(Example("touches", touches, read_touches))
+    run_rig(replace(RIG, most_views=3), folder / "rig session")
+    readers.append(Example("rig session", folder / "rig session", rig_session))
     journey = Journey(stations=3, stand_s=0.3, move_s=0.3, picture_hz=5.0, pose_hz=20.0)
     # Written by a peer, which need not be installed.
     peer = importlib.util.find_spec("rosbags") is not None
@@ -181,9 +204,20 @@ def examples(folder: Path) -> tuple[list[Example], list[Example]]:
             ("run", "--resume", "--session"),
         )
     ]
-    result = folder / "result.json"
+    result, log = folder / "result.json", folder / "nights.jsonl"
+    with redirect_stdout(StringIO()):
+        run_command(["check", str(recording), str(recording), "--log", str(log)])
+    commands += [
+        Example(f"handeye {words[0]} of a rig", folder / "rig session", command(*words))
+        for words in (("solve",), ("report",), ("validate",), ("run", "--resume", "--session"))
+    ]
+    commands += [Example(f"handeye solve {path.name}", path, command("solve")) for path in made]
+    commands += [Example("handeye run --dry-run", path, dry_run) for path in arms]
     commands += [
         Example("handeye detect", photos, command("detect", "--rows", "6", "--columns", "9")),
+        Example("handeye verify", touches, command("verify", str(touched_recording))),
+        Example("handeye solve --touches", touches, command("solve", str(touched_recording), "--touches")),
+        Example("handeye check --log", log, command("check", str(recording), str(recording), "--log")),
         Example("handeye report", result, command("report")),
         Example("handeye export", result, command("export", "--format", "ros2")),
         Example("handeye diff", result, command("diff", str(result))),
@@ -292,6 +326,7 @@ def worker(inputs: Inputs, numbers: range, to: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (used + MOST_BYTES, used + MOST_BYTES))
     signal.signal(signal.SIGPROF, _too_long)
     with tempfile.TemporaryDirectory() as name, os.fdopen(to, "w") as pipe:
+        os.chdir(name)  # commands write beside themselves
         for number in numbers:
             pipe.write(f"begin\t{number}\n")
             pipe.flush()

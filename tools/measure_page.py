@@ -3,10 +3,12 @@
     .venv/bin/python tools/measure_page.py
 
 Prints, for 5,000 candidates and 50 views, the time from a key press to the scene drawn again, and from the
-press of a view to its residuals on the page (median and largest of 20). Then the processor time of the same
-simulated session, with pictures, without a page and with one that is watched. Needs chromium.
+press of a view to its residuals on the page (median and largest of 20). Then how long the steps of the loop
+take in a simulated session with rendered pictures, without a page and with such a crowded one that is open:
+in turns, by the clock on the wall, with no time spent on motions. Needs chromium.
 """
 
+import argparse
 import statistics
 import sys
 import tempfile
@@ -34,6 +36,7 @@ from handeye.ui.documents import Shown  # noqa: E402
 from handeye.ui.still import Still  # noqa: E402
 
 CANDIDATES, VIEWS, TIMES = 5000, 50, 20
+STEPS, TURNS = 12, 5
 QUICK = Configuration(
     "ur5e", accuracy_mm=None, accuracy_deg=None, most_views=8, simulation=Simulation(points_only=0.1)
 )
@@ -117,47 +120,85 @@ def interactions() -> None:
     server.close()
 
 
-def session_seconds(*, watched: bool) -> float:
-    """Return the processor time of this process that a session takes, with the server if it is watched."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        if not watched:
-            return spent(Observer(), folder)
-        hub = Hub()
-        dashboard = Dashboard(hub)
-        server = Server(hub, pictures=dashboard)
-        with browser(folder) as opened:
-            opened(server.address)
-            seconds = spent(dashboard, folder)
-        server.close()
-        return seconds
+class Crowded(Dashboard):
+    """Shows many candidates and views whatever the session has."""
+
+    def __init__(self, hub: Hub, crowd: Shown) -> None:
+        self._crowd = crowd
+        super().__init__(hub)
+
+    def _told(self, step: Step | End, shown: Shown, count: int) -> None:
+        crowd = self._crowd
+        super()._told(step, replace(shown, views=crowd.views, considered=crowd.considered), count)
 
 
-def spent(observer: Observer, folder: Path) -> float:
-    """Run a session as `drive` does; return the processor time."""
-    prepared = prepare(replace(QUICK, simulation=Simulation()), observer=observer)
+def session_seconds(folder: Path, dashboard: Dashboard | None) -> tuple[list[float], float]:
+    """Run a session as `drive` does.
+
+    Return how long each step of the loop took by the clock on the wall, and the processor time of all.
+    """
+    observer = Observer() if dashboard is None else dashboard
+    asked = replace(QUICK, most_views=STEPS, simulation=Simulation())
+    prepared = prepare(asked, observer=observer)
     session, store = begin(prepared, folder / "s")
-    if isinstance(observer, Dashboard):
-        observer.prepare(prepared, store)
-    began = time.process_time()
+    if dashboard is not None:
+        dashboard.prepare(prepared, store)
+    seconds: list[float] = []
+    spent = time.process_time()
     step: Step | End | None = None
     while not isinstance(step, End):
+        began = time.perf_counter()
         step = session.next()
-        if isinstance(observer, Dashboard):
-            observer.decided(step, session.views, session.rejected)
+        if dashboard is not None:
+            dashboard.decided(step, session)
+            dashboard.waits(waits=False)
         if isinstance(step, Step):
             session.take(step)
-    seconds = time.process_time() - began
+        seconds.append(time.perf_counter() - began)
+    spent = time.process_time() - spent
     store.close()
-    return seconds
+    return seconds, spent
+
+
+def loop() -> None:
+    """Compare the steps of the loop with a page that is open, and without one, in turns."""
+    hub = Hub()
+    dashboard = Crowded(hub, crowded())
+    server = Server(hub, pictures=dashboard)
+    alone, watched = list[float](), list[float]()
+    processor = {False: 0.0, True: 0.0}
+    with tempfile.TemporaryDirectory() as name, browser(Path(name)) as opened:
+        for turn in range(TURNS):
+            for times, shown in ((alone, None), (watched, dashboard)):
+                window = None if shown is None else opened(server.address)
+                with tempfile.TemporaryDirectory() as folder:
+                    if window is not None:
+                        window.page.wait_for_timeout(1000)
+                    found, spent = session_seconds(Path(folder), shown)
+                    if turn:  # the first has much to import
+                        times.extend(found)
+                        processor[window is not None] += spent
+                if window is not None:
+                    window.page.close()
+    server.close()
+    told("a step of the loop alone", alone)
+    told(f"with a page of {CANDIDATES} candidates and {VIEWS} views", watched)
+    more = [sum(watched[i :: STEPS + 1]) / sum(alone[i :: STEPS + 1]) for i in range(STEPS + 1)]
+    median = 100 * (statistics.median(more) - 1)
+    more_spent = 100 * (processor[True] / processor[False] - 1)
+    print(f"processor time of the program, server and all: {more_spent:.1f} % more")
+    print(f"slower by {100 * (sum(watched) / sum(alone) - 1):.1f} %, the median step by {median:.1f} %")
 
 
 def main() -> None:
     """Measure both."""
-    interactions()
-    alone, watched = (min(session_seconds(watched=w) for _ in range(2)) for w in (False, True))
-    views = QUICK.most_views
-    print(f"a session of {views} views, processor time: {alone:.2f} s alone, {watched:.2f} s watched")
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", choices=["interactions", "loop"])
+    only = parser.parse_args().only
+    if only != "loop":
+        interactions()
+    if only != "interactions":
+        loop()
 
 
 if __name__ == "__main__":

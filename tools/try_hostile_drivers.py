@@ -1,11 +1,14 @@
 """Run sessions on drivers with one fault each, and count what must never happen.
 
+.venv/bin/python tools/try_hostile_drivers.py --rendered
+.venv/bin/python tools/try_hostile_drivers.py --sessions 200 --first 100
 .venv/bin/python tools/try_hostile_drivers.py --drivers $HANDEYE_DATA/cases/hostile/evil_driver
 
-`--drivers` is a folder with `evil.py`, which announces `evil:MODE` as robot and `evilcam:MODE` as camera, and
-logs every motion: the joints sent, whether they are beyond a limit, and how many motions run at once. Counted
-are goals beyond limits, motions at once, exit codes that mean a mistake of ours, and sessions that do not go
-on with --resume.
+The drivers are those of `hostile_drivers.py`, or with `--drivers` a folder with `evil.py`, which announces
+`evil:MODE` as robot and `evilcam:MODE` as camera. Both log every motion: whether the joints sent are beyond
+a limit, and how many motions run at once. Counted are goals beyond limits, motions at once, exit codes that
+mean a mistake of ours, answers outside twice their stated radius, and sessions that do not go on with
+--resume. `--sessions` mixes faults of robot and camera in 30 % of the calls.
 """
 
 import argparse
@@ -16,31 +19,74 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-ROBOT = """
+import numpy as np
+
+from handeye.robots import open_arm
+from handeye.session.simulated import SimulationOptions, simulated_cell
+
+EVIL_ROBOT = """
 ok raise raise_once sysexit kbd hang hang_once slow refuse half elsewhere ignore mem longmsg binmsg degrees
 degrees_nojoint offset offset_nojoints frozen none matrix nanjoints fewjoints manyjoints emptyjoints nppose
 npjoints strjoints mm inverse nanpose readhang stopraise stophang
 """
-CAMERA = """
+EVIL_CAMERA = """
 none array raise hang hang_once stale stalenoise colour size float readonly strided fortran flip rot black
 noise tsnan tsstr points_nan points_dup points_out points_many points_list
 """
+ENTRY_POINTS = """
+[handeye.robots]
+hostile = hostile_drivers:Robot
+[handeye.cameras]
+hostilecam = hostile_drivers:Camera
+"""
 # Few views, much asked for, little patience: the faults come at the fourth motion or picture.
 HANDEYE = (sys.executable, "-c", "from handeye.cli import main; main()")
-ASKED = ("--accuracy-mm", "0.02", "--accuracy-deg", "0.002", "--max-views", "8", "--no-confirm")
-TIMES = ("--move-timeout-s", "1.5", "--read-timeout-s", "1", "--camera-timeout-s", "1")
+ASKED = ("--accuracy-mm", "0.02", "--accuracy-deg", "0.002", "--no-confirm", "--json")
 SPACE = ("--workspace-mm", "-900", "-900", "20", "900", "900", "1400")
+# Both kinds of drivers stand in this cell.
+ARM, SEED = "epson_c4l", 31
+TRUTH = simulated_cell(open_arm(ARM), SimulationOptions(seed=SEED))
 
 
-def run(arguments: list[str], environment: dict[str, str], seconds: float) -> dict[str, Any]:
-    """Run a command; return its exit code and what it said."""
+@dataclass(frozen=True)
+class Drivers:
+    """Where the drivers are, what they are called, and the files of camera and target."""
+
+    path: tuple[Path, ...]
+    robot: str
+    camera: str
+    camera_file: Path
+    target_file: Path
+    robot_modes: tuple[str, ...]
+    camera_modes: tuple[str, ...]
+
+
+def ours(folder: Path) -> Drivers:
+    """Announce our own drivers in an empty folder."""
+    from hostile_drivers import CAMERA_MODES, ROBOT_MODES  # noqa: PLC0415 - only where they are asked for
+
+    announced = folder / "hostile-1.0.dist-info"
+    announced.mkdir()
+    (announced / "METADATA").write_text("Metadata-Version: 2.1\nName: hostile\nVersion: 1.0\n")
+    (announced / "entry_points.txt").write_text(ENTRY_POINTS)
+    (folder / "camera.json").write_text(json.dumps(TRUTH.cell.camera.to_dict()))
+    (folder / "target.json").write_text(json.dumps(TRUTH.cell.target.to_dict()))
+    path = (folder, Path(__file__).resolve().parent)
+    files = folder / "camera.json", folder / "target.json"
+    return Drivers(path, "hostile", "hostilecam", *files, ROBOT_MODES, CAMERA_MODES)
+
+
+def run(arguments: list[str], environment: dict[str, str], folder: Path, seconds: float) -> dict[str, Any]:
+    """Run a command; return its exit code, what it said and the answer's distance from the truth."""
     began = time.monotonic()
     try:
         done = subprocess.run(
             arguments,
+            cwd=folder,
             env=environment,
             capture_output=True,
             text=True,
@@ -57,44 +103,65 @@ def run(arguments: list[str], environment: dict[str, str], seconds: float) -> di
         "seconds": time.monotonic() - began,
         "traceback": "Traceback" in done.stderr or "PanicException" in done.stderr,
         "failures": sorted(set(re.findall(r"s  ([a-z_]+): ", done.stderr))),
+        "off": off(done.stdout),
     }
 
 
-def attempt(drivers: Path, robot: str, camera: str, points: bool, seconds: float) -> dict[str, Any]:
-    """Run a session on one robot and one camera, then go on with it twice."""
+def off(printed: str) -> float:
+    """Return by how many times its stated radius an answer is off; 0 without an answer."""
+    try:
+        answer = json.loads(printed[printed.index("\n{\n" if printed[:1] != "{" else "{") :])
+        found, within = answer["calibration"]["T_flange_camera"], answer["within_95"]
+    except (ValueError, KeyError, TypeError):
+        return 0.0
+    if found is None or within is None or TRUTH.truth.X is None:
+        return 0.0
+    matrix = np.array(found["matrix"] if isinstance(found, dict) else found)
+    # The recorded X is T_camera_flange.
+    error = TRUTH.truth.X.matrix @ matrix
+    angle = np.rad2deg(np.arccos(np.clip((np.trace(error[:3, :3]) - 1) / 2, -1, 1)))
+    distance = 1e3 * float(np.linalg.norm(matrix[:3, 3] - TRUTH.truth.X.inverse().translation))
+    return max(distance / within["translation_mm"], float(angle) / within["rotation_deg"])
+
+
+def attempt(drivers: Drivers, robot: str, camera: str, options: argparse.Namespace) -> dict[str, Any]:
+    """Run a session on one robot and one camera, then go on with it, the second time without faults."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        log = folder / "evil.log"
+        log = folder / "motions.log"
+        before = os.environ.get("PYTHONPATH", "")
         environment = dict(os.environ) | {
-            "PYTHONPATH": os.pathsep.join([str(drivers), os.environ.get("PYTHONPATH", "")]),
+            "PYTHONPATH": os.pathsep.join([*map(str, drivers.path), before]),
             "EVIL_LOG": str(log),
+            "HOSTILE_LOG": str(log),
             "EVIL_SLOW": "2.5",
         }
-        if points:
-            environment["EVIL_POINTS"] = "1"
-        command = [*HANDEYE, "run", "--session", str(folder / "session")]
+        if not options.rendered:
+            environment |= {"EVIL_POINTS": "1", "HOSTILE_POINTS": "1"}
+        command = [*HANDEYE, "run", "--session", "session"]
+        patience = str(options.patience_s)
         first = [
-            *("--robot", "epson_c4l", "--driver", robot, "--images", camera),
-            *("--camera", str(drivers / "simcam.json"), "--target", str(drivers / "simtarget.json")),
+            *("--robot", ARM, "--driver", robot, "--images", camera),
+            *("--camera", str(drivers.camera_file), "--target", str(drivers.target_file)),
             *SPACE,
             *ASKED,
-            *TIMES,
+            *("--max-views", str(options.views), "--move-timeout-s", "1.5"),
+            *("--read-timeout-s", patience, "--camera-timeout-s", patience),
         ]
-        outcome = run([*command, *first], environment, seconds)
+        outcome = run([*command, *first], environment, folder, options.seconds)
         began = (folder / "session").exists()
-        again = []
-        if began:
-            calm = environment | {"EVIL_CALM": "1"}
-            again = [run([*command, "--resume", "--no-confirm"], calm, seconds) for _ in range(1)]
+        again: list[dict[str, Any]] = []
+        for faults in ({}, {"HOSTILE_CALM": "1"}) if began else ():
+            line = [*command, "--resume", "--no-confirm", "--json"]
+            again.append(run(line, environment | faults, folder, options.seconds))
         events = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
         moves = [event for event in events if event.get("event") == "move"]
         return {
-            "robot": robot,
-            "camera": camera,
-            "points": points,
             **outcome,
             "began": began,
             "again": [one["code"] for one in again],
+            "traceback": any(one.get("traceback") for one in (outcome, *again)),
+            "offs": [one.get("off", 0.0) for one in (outcome, *again)],
             "moves": len(moves),
             "beyond": sum(bool(move["beyond"]) for move in moves),
             "concurrent": sum(move["concurrent"] > 1 for move in moves),
@@ -104,31 +171,49 @@ def attempt(drivers: Path, robot: str, camera: str, points: bool, seconds: float
 def main() -> int:
     """Run every mode; return 1 if anything happened that must not."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--drivers", type=Path, required=True)
+    parser.add_argument("--drivers", type=Path, help="folder with evil.py; by default our own")
     parser.add_argument("--modes", nargs="*", help="only these, of robot or camera")
+    parser.add_argument("--part", type=int, nargs=2, default=(0, 1), help="the k-th of n parts of the modes")
+    parser.add_argument("--sessions", type=int, default=0, help="sessions with mixed faults instead")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first of them")
     parser.add_argument("--rendered", action="store_true", help="pictures instead of points")
+    parser.add_argument("--views", type=int, default=8, help="most views")
+    parser.add_argument("--patience-s", type=float, default=1.0, help="for readings and pictures")
     parser.add_argument("--seconds", type=float, default=120.0, help="longest run")
     options = parser.parse_args()
-    cases = [(f"evil:{mode}", "evilcam:ok,99") for mode in ROBOT.split()]
-    cases += [("evil:ok,99", f"evilcam:{mode}") for mode in CAMERA.split()]
-    bad = 0
-    for robot, camera in cases:
-        mode = robot.partition(":")[2] if camera.endswith("ok,99") else camera.partition(":")[2]
-        if options.modes and mode not in options.modes:
-            continue
-        found = attempt(options.drivers.resolve(), robot, camera, not options.rendered, options.seconds)
-        codes = [found["code"], *found["again"]]
-        wrong = found["beyond"] > 0 or found["concurrent"] > 0 or 1 in codes or "timeout" in codes
-        wrong = wrong or bool(found.get("traceback"))
-        bad += wrong
-        counts = f"moves {found['moves']} beyond {found['beyond']} at once {found['concurrent']}"
-        print(
-            f"{'WRONG' if wrong else 'ok':<6}{robot:<20} {camera:<20} exit {found['code']} "
-            f"then {found['again']} {counts} {found['seconds']:.0f} s "
-            f"{','.join(found.get('failures', []))} | {found['said'][:150]}",
-            flush=True,
-        )
-    print(f"{bad} of {len(cases)} wrong")
+    bad, worst = 0, 0.0
+    with tempfile.TemporaryDirectory() as name:
+        if options.drivers is None:
+            drivers = ours(Path(name))
+        else:
+            folder = options.drivers.resolve()
+            files = folder / "simcam.json", folder / "simtarget.json"
+            modes = tuple(EVIL_ROBOT.split()), tuple(EVIL_CAMERA.split())
+            drivers = Drivers((folder,), "evil", "evilcam", *files, *modes)
+        good = f"{drivers.robot}:ok,99", f"{drivers.camera}:ok,99"
+        cases = [(f"{drivers.robot}:{mode}", good[1]) for mode in drivers.robot_modes]
+        cases += [(good[0], f"{drivers.camera}:{mode}") for mode in drivers.camera_modes]
+        if options.modes:
+            wanted = {f"{kind}:{mode}" for kind in (drivers.robot, drivers.camera) for mode in options.modes}
+            cases = [case for case in cases if wanted & set(case)]
+        if options.sessions:
+            seeds = range(options.first, options.first + options.sessions)
+            cases = [(f"{drivers.robot}:mix,{seed}", f"{drivers.camera}:mix,{seed}") for seed in seeds]
+        cases = cases[options.part[0] :: options.part[1]]
+        for robot, camera in cases:
+            found = attempt(drivers, robot, camera, options)
+            codes = [found["code"], *found["again"]]
+            wrong = found["beyond"] > 0 or found["concurrent"] > 0 or 1 in codes or "timeout" in codes
+            wrong = wrong or bool(found["traceback"]) or max(found["offs"]) > 2
+            bad, worst = bad + wrong, max(worst, *found["offs"])
+            counts = f"moves {found['moves']} beyond {found['beyond']} at once {found['concurrent']}"
+            print(
+                f"{'WRONG' if wrong else 'ok':<6}{robot:<20} {camera:<20} exit {found['code']} "
+                f"then {found['again']} {counts} off {max(found['offs']):.2f} {found['seconds']:.0f} s "
+                f"{','.join(found.get('failures', []))} | {found['said'][:150]}",
+                flush=True,
+            )
+    print(f"{bad} of {len(cases)} wrong, answers at most {worst:.2f} of their stated radius off")
     return 1 if bad else 0
 
 

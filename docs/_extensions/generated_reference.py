@@ -19,7 +19,12 @@ from handeye.cli.app import COMMANDS, make_app
 
 ROOMS = ("handeye", "handeye.types", "handeye.errors", "handeye.datasets", "handeye.detection")
 ROOMS += ("handeye.estimation", "handeye.planning", "handeye.robots", "handeye.cameras", "handeye.session")
-ROOMS += ("handeye.export", "handeye.printing", "handeye.report", "handeye.testing", "handeye.ui")
+ROOMS += ("handeye.export", "handeye.testing")
+EXAMPLES = (
+    "The examples, each of which is run by the tests, speak of a simulated cell: `recording` of nine views, "
+    "its `camera`, `board` and `arm`, the `measurements` and the `estimate` from them, the `result` of "
+    "solving it, the `folder` where it is written; and a `rig` of four cameras with its `rig_estimate`."
+)
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
 LISTS = {"Parameters", "Attributes", "Returns", "Raises"}
 
@@ -27,6 +32,7 @@ LISTS = {"Parameters", "Attributes", "Returns", "Raises"}
 def python_page() -> str:
     """Return the page of all public names, by room."""
     lines = ["# Python", "", "Units and frames are those of [the conventions](../conventions.md).", ""]
+    lines += [EXAMPLES, ""]
     for name in ROOMS:
         room = importlib.import_module(name)
         names = [n for n in getattr(room, "__all__", []) if not n.startswith("__")]

@@ -63,7 +63,7 @@ def visit_inline(translator: HTML5Translator, node: nodes.math) -> None:
 
 def visit_block(translator: HTML5Translator, node: nodes.math_block) -> None:
     """Write a formula of its own, with its number if it has a label."""
-    translator.body.append(translator.starttag(node, "div", CLASS="formula"))
+    translator.body.append(translator.starttag(node, "div", CLASS="formula", tabindex="0"))
     if node["number"]:
         number = get_node_equation_number(translator, node)
         translator.body.append(f'<span class="eqno">({number})')

@@ -240,7 +240,8 @@ class Problem:
         motions: ArrayLike,
     ) -> None: ...
     @property
-    def view_count(self) -> int: ...
+    def view_count(self) -> int:
+        """Number of views."""
     def solve(
         self,
         x: ArrayLike,
@@ -251,7 +252,8 @@ class Problem:
         cost_tolerance: float = 1e-10,
         step_tolerance: float = 1e-13,
         gradient_tolerance: float = 1e-12,
-    ) -> Solution: ...
+    ) -> Solution:
+        """Minimise the reprojection error from X and Y (4, 4); raises SolveError where it diverges."""
     def squared_error(self, x: ArrayLike, y: ArrayLike, *, views: list[int] | None = None) -> float:
         """Sum of squared residuals in px^2; infinite where the target is out of sight."""
 
@@ -259,24 +261,32 @@ class Solution:
     """The answer of a solve."""
 
     @property
-    def x(self) -> NDArray[float64]: ...
+    def x(self) -> NDArray[float64]:
+        """X (4, 4)."""
     @property
-    def y(self) -> NDArray[float64]: ...
+    def y(self) -> NDArray[float64]:
+        """Y (4, 4)."""
     @property
-    def information(self) -> NDArray[float64]: ...
+    def information(self) -> NDArray[float64]:
+        """Information (12, 12) of `[xi_x; xi_y]`, metres and radians, the prior included."""
     @property
     def covariance(self) -> NDArray[float64]:
         """Inverse of the information; raises DegenerateError if that is singular."""
     @property
-    def cost(self) -> float: ...
+    def cost(self) -> float:
+        """Minus twice the log posterior up to constants."""
     @property
-    def initial_cost(self) -> float: ...
+    def initial_cost(self) -> float:
+        """The cost at the start."""
     @property
-    def iterations(self) -> int: ...
+    def iterations(self) -> int:
+        """Number of steps that were taken."""
     @property
-    def ending(self) -> str: ...
+    def ending(self) -> str:
+        """How it ended."""
     @property
-    def is_converged(self) -> bool: ...
+    def is_converged(self) -> bool:
+        """Whether it came to rest at a minimum."""
 
 class Agreement:
     """Views of one target through one camera, linearised at X and Y (4, 4), to be fitted in sets.
@@ -328,13 +338,17 @@ class Belief:
 
     def __init__(self, information: ArrayLike) -> None: ...
     @property
-    def covariance(self) -> NDArray[float64]: ...
+    def covariance(self) -> NDArray[float64]:
+        """Inverse of the information (n, n)."""
     @property
-    def log_determinant(self) -> float: ...
+    def log_determinant(self) -> float:
+        """Logarithm of the determinant of the information."""
     @property
-    def entropy(self) -> float: ...
+    def entropy(self) -> float:
+        """Entropy of all parameters, nats."""
     @property
-    def hand_eye_entropy(self) -> float: ...
+    def hand_eye_entropy(self) -> float:
+        """Entropy of the hand-eye alone, nats."""
 
 class Criterion:
     """Worth of a view: entropy, entropy_handeye, trace, eigenvalue_sum, min_eigenvalue, tool_point or task.
@@ -354,7 +368,8 @@ class Criterion:
         tasks: ArrayLike | None = None,
     ) -> None: ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Its name."""
 
 class Predictor:
     """Predicts what candidate views would tell, at motions A (N, 4, 4).
@@ -441,13 +456,16 @@ class PoseMeasurements:
 
     def __len__(self) -> int: ...
     @property
-    def variances_px2(self) -> list[float]: ...
+    def variances_px2(self) -> list[float]:
+        """Variance of the pixels of each view from its own residual, px^2."""
     @property
-    def covariances(self) -> NDArray[float64]: ...
+    def covariances(self) -> NDArray[float64]:
+        """Covariances (K, 6, 6) of the poses at 1 px, metres and radians."""
     def camera_normal(self) -> tuple[NDArray[float64], NDArray[float64]]:
         """Information (n, n) and gradient (n,) of the free parameters, all views together, at 1 px."""
     @property
-    def sensitivities(self) -> NDArray[float64]: ...
+    def sensitivities(self) -> NDArray[float64]:
+        """How each pose moves with the camera's free parameters and, last, the board's scale (K, 6, c)."""
     def shared_error(self, variances_px2: list[float]) -> float:
         """Factor on the variances for errors that neighbouring points share; one where there are none."""
 
@@ -458,38 +476,53 @@ class Posterior:
     """What is believed of a cell."""
 
     @property
-    def x(self) -> NDArray[float64]: ...
+    def x(self) -> NDArray[float64]:
+        """X of each camera (C, 4, 4)."""
     @property
-    def y(self) -> NDArray[float64]: ...
+    def y(self) -> NDArray[float64]:
+        """Y of each target (T, 4, 4)."""
     @property
-    def theta(self) -> NDArray[float64]: ...
+    def theta(self) -> NDArray[float64]:
+        """All parameters (n,): twists (zero), cameras, boards, constants of the arm."""
     @property
-    def covariance(self) -> NDArray[float64]: ...
+    def covariance(self) -> NDArray[float64]:
+        """Covariance (n, n) of `theta`."""
     @property
-    def information(self) -> NDArray[float64]: ...
+    def information(self) -> NDArray[float64]:
+        """Information (n, n) at the likeliest levels."""
     @property
-    def constants(self) -> list[tuple[str, int, int]]: ...
+    def constants(self) -> list[tuple[str, int, int]]:
+        """Components with constants: name, first and one beyond the last of theirs in `theta`."""
     @property
-    def level_names(self) -> list[str]: ...
+    def level_names(self) -> list[str]:
+        """Names (L) of the levels of noise."""
     @property
-    def levels(self) -> list[list[float]]: ...
+    def levels(self) -> list[list[float]]:
+        """Levels at each node (N, L), at the mode first."""
     @property
-    def weights(self) -> list[float]: ...
+    def weights(self) -> list[float]:
+        """Share of each node (N,)."""
     @property
-    def degrees_of_freedom(self) -> list[float]: ...
+    def degrees_of_freedom(self) -> list[float]:
+        """Degrees of freedom of the covariance of each X."""
     def degrees_of_freedom_of(self, combinations: ArrayLike) -> list[float]:
         """Degrees of freedom of the covariance of six linear combinations of `theta`, each of (K, 6, n)."""
 
     @property
-    def attribution(self) -> list[tuple[str, float, float]]: ...
+    def attribution(self) -> list[tuple[str, float, float]]:
+        """Components of the error: name, fall of the log likelihood without it, mean square misfit."""
     @property
-    def robot_loss(self) -> float: ...
+    def robot_loss(self) -> float:
+        """Fall of the log likelihood where the robot is taken as exact."""
     @property
-    def value(self) -> float: ...
+    def value(self) -> float:
+        """Minus the logarithm of the posterior density of the levels at their mode."""
     @property
-    def effort(self) -> tuple[int, int, bool]: ...
+    def effort(self) -> tuple[int, int, bool]:
+        """Linearisations, steps of the levels, and whether all came to rest."""
     @property
-    def origin(self) -> str: ...
+    def origin(self) -> str:
+        """Where the start came from."""
 
 def estimate_cell(
     stations: ArrayLike,
@@ -540,7 +573,8 @@ class Chain:
         self, placements: ArrayLike, axes: ArrayLike, sliding: list[bool], limits: ArrayLike, tip: ArrayLike
     ) -> None: ...
     @property
-    def joint_count(self) -> int: ...
+    def joint_count(self) -> int:
+        """Number of joints."""
     def forward(self, joints: ArrayLike) -> NDArray[float64]:
         """`T_base_flange` (N, 4, 4) at joints (N, n)."""
 

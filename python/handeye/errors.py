@@ -7,16 +7,37 @@ found and what was expected, a `code` that a script can compare, and a `hint` th
 from enum import IntEnum
 from typing import ClassVar
 
+__all__ = [
+    "DegenerateError",
+    "DetectionError",
+    "DeviceError",
+    "ExitCode",
+    "HandeyeError",
+    "InputError",
+    "OutputError",
+    "SolveError",
+    "UnstatedError",
+]
+
 
 def printable(text: object, limit: int) -> str:
     """Return a text of others, shortened, without what cannot be shown or would steer a terminal."""
-    shown = str(text)
+    try:
+        shown = str(text)
+    except Exception:  # noqa: BLE001 - whatever a driver's object does
+        shown = "(cannot be shown)"
     cut = shown[:limit] + ("..." if len(shown) > limit else "")
     return "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in cut)
 
 
 class ExitCode(IntEnum):
-    """Exit codes of the command line."""
+    """Exit codes of the command line.
+
+    Examples
+    --------
+    >>> int(ExitCode.DEGENERATE)
+    4
+    """
 
     SUCCESS = 0
     UNEXPECTED = 1
@@ -68,7 +89,13 @@ class HandeyeError(Exception):
 
 
 class InputError(HandeyeError):
-    """The input cannot be used: a wrong shape, a file that is not what it claims, a value out of range."""
+    """The input cannot be used: a wrong shape, a file that is not what it claims, a value out of range.
+
+    Examples
+    --------
+    >>> InputError("3 rows: expected 4", code="wrong_shape").exit_code.name
+    'UNUSABLE_INPUT'
+    """
 
     exit_code = ExitCode.UNUSABLE_INPUT
     default_code = "invalid_input"
@@ -81,6 +108,11 @@ class UnstatedError(InputError):
     ----------
     options
         Options of the command line that say what the pictures agree with; empty where they do not tell.
+
+    Examples
+    --------
+    >>> UnstatedError("whose poses?", hint="say --notation", options=("--notation", "ur")).options
+    ('--notation', 'ur')
     """
 
     default_code = "notation_unstated"
@@ -93,35 +125,65 @@ class UnstatedError(InputError):
 
 
 class DegenerateError(HandeyeError):
-    """The views leave directions of the answer undetermined."""
+    """The views leave directions of the answer undetermined.
+
+    Examples
+    --------
+    >>> DegenerateError("the views turn about one axis").code
+    'degenerate'
+    """
 
     exit_code = ExitCode.DEGENERATE
     default_code = "degenerate"
 
 
 class DetectionError(HandeyeError):
-    """The target was not found in an image."""
+    """The target was not found in an image.
+
+    Examples
+    --------
+    >>> DetectionError("no pattern", hint="describe the board").hint
+    'describe the board'
+    """
 
     exit_code = ExitCode.DETECTION
     default_code = "not_detected"
 
 
 class SolveError(HandeyeError):
-    """A numerical step failed or did not converge."""
+    """A numerical step failed or did not converge.
+
+    Examples
+    --------
+    >>> SolveError("no minimum").message
+    'no minimum'
+    """
 
     exit_code = ExitCode.SOLVE
     default_code = "not_solved"
 
 
 class OutputError(HandeyeError):
-    """A result cannot be written."""
+    """A result cannot be written.
+
+    Examples
+    --------
+    >>> OutputError("the disk is full").code
+    'not_written'
+    """
 
     exit_code = ExitCode.OUTPUT
     default_code = "not_written"
 
 
 class DeviceError(HandeyeError):
-    """A robot or a camera did not do what it was asked."""
+    """A robot or a camera did not do what it was asked.
+
+    Examples
+    --------
+    >>> int(DeviceError("no answer within 5 s", code="timeout").exit_code)
+    8
+    """
 
     exit_code = ExitCode.DEVICE
     default_code = "device_failed"

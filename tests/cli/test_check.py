@@ -9,9 +9,10 @@ import pytest
 from commands import Handeye
 from folders import photographed, written
 from handeye.errors import ExitCode
+from handeye.estimation import Measurements
 from handeye.simulation.cells import CellOptions, ErrorKind, SimulatedCell, simulate_cell
 from handeye.studies.shift import picture
-from handeye.types import Pose
+from handeye.types import Pose, Target
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +59,18 @@ def test_poses_are_planned(handeye: Handeye, cell: SimulatedCell, tmp_path: Path
     assert len(found["poses"]) == 3
     assert found["detectable_mm"] > 0
     assert "Take pictures again where" in handeye("check", old).out
+
+
+def test_views_of_another_board(handeye: Handeye, cell: SimulatedCell, tmp_path: Path) -> None:
+    old, _ = folders(cell, tmp_path, Pose.identity())
+    rows = cell.recording.target.to_dict()["rows"]
+    larger = Target.from_dict({**cell.recording.target.to_dict(), "rows": rows + 1})
+    view = cell.recording.views[11]
+    more = replace(view, point_ids=[*view.point_ids[:-1], larger.point_count - 1])
+    other = replace(cell.recording, target=larger, views=(more,))
+    assert handeye.fails("check", old, written(other, tmp_path / "other"))["code"] == "another_target"
+    measured = Measurements.of_recording(cell.recording).with_views([replace(more, name="of_another")])
+    assert "(0 to" in measured.rejected["of_another"]
 
 
 @pytest.mark.parametrize(

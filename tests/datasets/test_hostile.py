@@ -79,8 +79,11 @@ def test_robot_cal_tools(rct: Path, data: st.DataObject) -> None:
 
 @pytest.fixture(scope="module")
 def without_pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """One small set of every layout that has poses in the place of pictures."""
-    root = tmp_path_factory.mktemp("hostile")
+    return poses_alone(tmp_path_factory.mktemp("hostile"))
+
+
+def poses_alone(root: Path) -> dict[str, Path]:
+    """Write one small set of every layout that has poses in the place of pictures."""
     listed = stations(Mounting.EYE_IN_HAND, 3)
     times = [0.0, 0.1, 0.2]
     streams = times, [pose for pose, _ in listed], times, [seen for _, seen in listed]

@@ -1,6 +1,7 @@
 """Images that claim more than they hold are refused before they fill the memory."""
 
 import struct
+import tracemalloc
 import zlib
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handeye.datasets.images import read_image
+from handeye.datasets.images import MAX_BYTES, read_image
 from handeye.errors import InputError
 
 
@@ -51,3 +52,14 @@ def test_sixteen_bits_become_eight_by_a_power_of_two(tmp_path: Path) -> None:
     grey = np.arange(4096, dtype=np.uint16).reshape(64, 64)
     assert cv2.imwrite(str(tmp_path / "deep.png"), grey)
     np.testing.assert_array_equal(read_image(tmp_path / "deep.png"), (grey >> 4).astype(np.uint8))
+
+
+def test_reading_reserves_no_more_than_the_file_has(tmp_path: Path) -> None:
+    path = tmp_path / "small.png"
+    assert cv2.imwrite(str(path), np.zeros((8, 8), dtype=np.uint8))
+    tracemalloc.start()
+    try:
+        read_image(path)
+        assert tracemalloc.get_traced_memory()[1] < MAX_BYTES / 100
+    finally:
+        tracemalloc.stop()

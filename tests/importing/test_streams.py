@@ -203,3 +203,14 @@ def test_certifiable_pairs(mounting: Mounting, tmp_path: Path) -> None:
     (tmp_path / "tag_1_cam_2_B.csv").write_text("1,0,0,0,0,0\n")
     with pytest.raises(InputError, match="line 1"):
         pairs(tmp_path / "tag_1_cam_2_A.csv")
+
+
+@pytest.mark.parametrize("spoil", [lambda lines: lines[:1], lambda lines: ["s" + lines[0][1:], *lines[1:]]])
+def test_a_table_without_rows_or_times(spoil: Callable[[list[str]], list[str]], tmp_path: Path) -> None:
+    kinhec(tmp_path, moving())
+    for name in ("x-0_camera.csv", "x-0_robot.csv"):
+        whole = (tmp_path / name).read_text()
+        (tmp_path / name).write_text("\n".join(spoil(whole.splitlines())))
+        with pytest.raises(InputError, match=f"{name}: no (poses in it|column t)"):
+            pairs(tmp_path)
+        (tmp_path / name).write_text(whole)

@@ -1,5 +1,7 @@
 """What a robot says of itself is taken only if it can be true, and the usual mistakes are named."""
 
+from typing import NoReturn
+
 import numpy as np
 import pytest
 
@@ -109,6 +111,13 @@ def test_without_joints_no_way_can_be_checked() -> None:
     assert checked_reading(Reading(pose), ARM, joints_needed=False).joints_rad is None
 
 
+class Trap:
+    """Something that raises whatever is asked of it."""
+
+    def __array__(self, *_: object, **__: object) -> NoReturn:
+        raise RuntimeError("trap")
+
+
 @pytest.mark.parametrize(
     "answer",
     [
@@ -125,6 +134,8 @@ def test_without_joints_no_way_can_be_checked() -> None:
         Reading(Pose.identity(), (0.0,) * 240),
         Reading(Pose.identity(), 3.0),  # type: ignore[arg-type]
         Reading(Pose.identity(), (1 + 2j,) * 6),  # type: ignore[arg-type]
+        Reading(Pose.__new__(Pose), (0.0,) * 6),
+        Reading(Pose.identity(), Trap()),  # type: ignore[arg-type]
     ],
 )
 def test_wrong_types_and_lengths_are_errors_of_the_device(answer: object) -> None:

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from typing import NoReturn
 
 import pytest
 
@@ -64,6 +65,11 @@ def test_without_a_limit_no_thread_and_no_clock(monkeypatch: pytest.MonkeyPatch)
     assert Calls("robot").run(float("inf"), int, "7") == 7
 
 
+class Unspeakable(Exception):  # noqa: N818
+    def __str__(self) -> NoReturn:
+        raise ValueError("no text")
+
+
 @pytest.mark.parametrize("seconds", [5.0, float("inf")])
 def test_messages_are_short_and_can_be_shown(seconds: float) -> None:
     assert MAX_MESSAGE <= 500
@@ -77,6 +83,8 @@ def test_messages_are_short_and_can_be_shown(seconds: float) -> None:
         DeviceError("y" * 10_000, code="\x1b" * 1000, hint="z" * 10_000),
         MemoryError(),
         KeyError("plc"),
+        Unspeakable(),
+        DeviceError(None, code=5, hint=Unspeakable()),  # type: ignore[arg-type]
     ):
         with pytest.raises(DeviceError) as found:
             Calls("robot").run(seconds, raising, error)

@@ -1,7 +1,7 @@
 """What a camera must be able to do: take one picture."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -61,27 +61,38 @@ class Frame:
 
 
 def checked_frame(answer: object) -> Frame:
-    """Return what a driver answered if it is a frame, its points as arrays of numbers.
+    """Return what a driver answered if it is a frame, its picture and points as plain arrays.
 
     Raises
     ------
     DeviceError
-        It is none, or its points or its time are not what they should be.
+        It is none, or its picture, its points or its time are not what they should be.
     """
     if not isinstance(answer, Frame):
         raise DeviceError(f"grab returns {type(answer).__name__}, expected Frame", code=BAD_FRAME)
-    time = answer.timestamp_s
-    if time is not None and not (isinstance(time, int | float) and math.isfinite(time)):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise DeviceError("frame: timestamp_s is no finite number", code=BAD_FRAME)
-    points = answer.points
-    if points is None:
-        return answer
     try:
+        return _plain(answer)
+    except InputError as error:
+        raise DeviceError(error.message, code=BAD_FRAME) from error
+    except Exception as error:
+        raise DeviceError(f"frame: unreadable ({type(error).__name__})", code=BAD_FRAME) from error
+
+
+def _plain(answer: Frame) -> Frame:
+    time, image, points = answer.timestamp_s, answer.image, answer.points
+    if time is not None and not (isinstance(time, int | float) and math.isfinite(time)):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError("frame: timestamp_s is no finite number")
+    if image is not None:
+        if not isinstance(image, np.ndarray):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise InputError(f"frame: image is {type(image).__name__}, expected an array of numpy")
+        image = np.asarray(image)  # not one of its subclasses
+    if points is not None:
+        if not isinstance(points, Points):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise InputError(f"frame: points are {type(points).__name__}, expected Points")
         ids = index_array(points.point_ids, "frame: point_ids")
         pixels = finite_array(points.pixels, (len(ids), 2), "frame: pixels")
-    except (InputError, AttributeError) as error:
-        raise DeviceError(str(error), code=BAD_FRAME) from error
-    return replace(answer, points=replace(points, point_ids=ids, pixels=pixels))
+        points = Points(ids, pixels, points.labels_known is True)
+    return Frame(image, points, time)
 
 
 @runtime_checkable

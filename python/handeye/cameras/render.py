@@ -43,6 +43,11 @@ class Appearance:
         Standard deviation of the noise, in grey values.
     supersampling
         Samples along each side of a pixel that an edge passes through.
+
+    Examples
+    --------
+    >>> Appearance(blur_px=0.7, noise=2.0).supersampling
+    8
     """
 
     dark: float = 25.0
@@ -59,10 +64,25 @@ class Appearance:
 class BoardRenderer:
     """Renders one target through one camera; the rays of the pixels are computed once.
 
+    Parameters
+    ----------
+    camera
+        Whose picture it is.
+    target
+        What is seen.
+    appearance
+        Grey values, blur, noise.
+
     Raises
     ------
     InputError
         A background that is not of the camera's size.
+
+    Examples
+    --------
+    >>> pose = measurements.poses[0].T_camera_target
+    >>> BoardRenderer(camera, board, Appearance(supersampling=1)).image(pose).shape == camera.size_px[::-1]
+    True
     """
 
     camera: Camera
@@ -210,16 +230,52 @@ def render(
 ) -> Image:
     """Return one picture (H, W) of a target; for several, keep a `BoardRenderer`.
 
+    Parameters
+    ----------
+    camera
+        Whose picture it is.
+    target
+        What is seen.
+    T_camera_target
+        Where the target is in the camera frame, metres.
+    appearance
+        Grey values, blur, noise.
+    random
+        Chance of the noise; needed where there is some.
+
     Raises
     ------
     InputError
         As `BoardRenderer` and its `image`.
+
+    Examples
+    --------
+    >>> pose = measurements.poses[0].T_camera_target
+    >>> render(camera, board, pose, Appearance(supersampling=1)).dtype
+    dtype('uint8')
     """
     return BoardRenderer(camera, target, appearance or Appearance()).image(T_camera_target, random)
 
 
 def clutter(width_px: int, height_px: int, random: np.random.Generator, *, shapes: int = 150) -> Image:
-    """Return a background (H, W) full of boxes and ellipses of all sizes and greys."""
+    """Return a background (H, W) full of boxes and ellipses of all sizes and greys.
+
+    Raises nothing.
+
+    Parameters
+    ----------
+    width_px, height_px
+        Size of the image.
+    random
+        Chance.
+    shapes
+        Number of boxes and ellipses.
+
+    Examples
+    --------
+    >>> clutter(64, 48, np.random.default_rng(0)).shape
+    (48, 64)
+    """
     image = np.full((height_px, width_px), 110, dtype=np.uint8)
     for _ in range(shapes):
         centre = random.uniform(0, [width_px, height_px])

@@ -1,10 +1,15 @@
 """The command line: one file per command, one boundary for errors, no rule that the library lacks."""
 
+import os
 import sys
 
 
 def main() -> None:
     """Run the command that the arguments name and leave with its exit code."""
-    from handeye.cli.boundary import run  # noqa: PLC0415 - importing this package costs nothing
+    from handeye.cli.boundary import INTERRUPTED, run  # noqa: PLC0415 - importing this package costs nothing
 
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    if code == INTERRUPTED:
+        # Taking the interpreter apart would wait for threads, and free what the system frees at once.
+        os._exit(code)
+    sys.exit(code)

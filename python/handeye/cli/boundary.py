@@ -17,6 +17,7 @@ from handeye.cli.app import COMMANDS, make_app
 from handeye.cli.failures import UnexpectedError, UsageError, WarnedError
 from handeye.errors import ExitCode, HandeyeError, InputError, OutputError, UnstatedError
 
+INTERRUPTED = int(ExitCode.INTERRUPTED)
 REPORT = (
     "This is a mistake in handeye. Please report it with the command, what --debug prints, and the version."
 )
@@ -49,7 +50,7 @@ def run(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         _silence_stdout()
         _complain("interrupted")
-        return ExitCode.INTERRUPTED
+        return INTERRUPTED
     except (BrokenPipeError, SystemExit):  # rich makes the second of the first
         _silence_stdout()  # the reader has seen enough
         return ExitCode.OUTPUT

@@ -5,6 +5,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
 from handeye.cli.failures import UsageError
@@ -14,7 +16,7 @@ from handeye.cli.source import Source
 from handeye.datasets.check_log import LoggedCheck, append_check, change_of, read_check_log
 from handeye.datasets.images import read_image
 from handeye.detection import NotFound, detect
-from handeye.errors import ExitCode, InputError
+from handeye.errors import ExitCode, InputError, printable
 from handeye.estimation import Estimate, Measurements, make_estimator, require_determined
 from handeye.estimation.faults import examine
 from handeye.estimation.shift import Check, check_views, plan_check
@@ -88,12 +90,30 @@ def check(
         if at is not None:
             new = (_pictured(views, at, opened.recording),)
         else:
-            new = source.open(views, arm.described()).recording.views
+            new = _of_the_same(source.open(views, arm.described()).recording, opened.recording)
         measured = Measurements.of(estimate.mounting, estimate.camera, estimate.target, new)
         answer = _checked(check_views(estimate, measured), opened.recording.name, log, picture)
     if output is not None:
         write_json(output, answer.data)
     return answer
+
+
+def _of_the_same(new: Recording, calibrated: Recording) -> tuple[View, ...]:
+    """Return the views of a recording that shows the target of the calibration.
+
+    Raises
+    ------
+    InputError
+        It shows another one.
+    """
+    if not np.array_equal(new.target.points, calibrated.target.points):
+        raise InputError(
+            f"{new.name}: {printable(new.target, 120)}, the calibration has "
+            f"{printable(calibrated.target, 120)}",
+            code="another_target",
+            hint="take pictures of the same target, and state it alike",
+        )
+    return new.views
 
 
 def _pictured(picture: Path, at: str, recording: Recording) -> View:

@@ -1,10 +1,10 @@
 """The options of the page in the browser, and how commands show it."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter, validators
 
@@ -13,14 +13,18 @@ from handeye.errors import InputError
 from handeye.estimation import Estimate, Measurements, RigCalibration
 from handeye.importing import Opened, OpenedRig
 from handeye.robots import Arm
-from handeye.session import End, Session, SessionStore
 from handeye.session.drivers import MANUAL, Person
+from handeye.session.prepared import Prepared
+from handeye.session.rig_prepared import RigPrepared
+from handeye.session.settings import Configuration
+from handeye.session.stepping import Stepping
+from handeye.session.store import Store
 
 if TYPE_CHECKING:
     from handeye.session.deciding import Considered
-    from handeye.session.prepared import Prepared
     from handeye.ui import Server
 
+E = TypeVar("E")
 # Numbers of views, and the radii in mm and deg that were stated after so many.
 Curve = tuple[tuple[int, float, float], ...]
 # How the formats that a folder is watched for begin.
@@ -48,29 +52,44 @@ class Live:
     ----------
     page
         Where it listens.
-    driver, images
+    configuration
         Of the session; a picture that is brought to the page goes into a watched folder.
     """
 
-    def __init__(self, page: Page, driver: str, images: str) -> None:
-        from handeye.ui import Dashboard, Hub, Pace, Server  # noqa: PLC0415 - other commands need no server
+    def __init__(self, page: Page, configuration: Configuration) -> None:
+        from handeye.ui import Dashboard, Hub, Pace, RigDashboard, Server  # noqa: PLC0415 - others need no server
 
         self.hub = Hub()
-        self.observer = Dashboard(self.hub)
-        self._pace = Pace(waits=driver.partition(":")[0] != MANUAL)
-        kind, _, folder = images.partition(":")
+        self.observer: Dashboard | RigDashboard = (
+            Dashboard(self.hub) if configuration.rig is None else RigDashboard(self.hub)
+        )
+        self._pace = Pace(waits=configuration.driver.partition(":")[0] != MANUAL)
+        kind, _, folder = configuration.images.partition(":")
         upload = _Upload(Path(folder)) if kind == "folder" else None
         self._server = Server(self.hub, page.ui_host, page.ui_port, pictures=self.observer, upload=upload)
         self.person = Person(self.hub.ask, self.hub.say)
         self.confirm = self._pace.confirm
         announce(self._server)
 
-    def run(self, session: Session, store: SessionStore, prepared: "Prepared") -> End:
-        """Run a session as people at the page ask for it."""
-        from handeye.ui import drive  # noqa: PLC0415
+    def run(self, session: Stepping[Any, E], store: Store, prepared: Prepared | RigPrepared) -> E:
+        """Run a session, of one camera or of several, as people at the page ask for it."""
+        from handeye.ui import More, drive  # noqa: PLC0415
+
+        known: Any = prepared  # goes with the store
+        observer: Any = self.observer
+
+        def again(asked: More) -> Stepping[Any, E]:
+            configuration = replace(
+                prepared.configuration,
+                accuracy_mm=asked.accuracy_mm,
+                accuracy_deg=asked.accuracy_deg,
+                most_views=asked.most_views,
+            )
+            return replace(known, configuration=configuration).session(store)
 
         try:
-            return drive(session, store, prepared, self.observer, self._pace)
+            observer.prepare(prepared, store)
+            return drive(session, prepared.cell, self.observer, self._pace, again)
         finally:
             self._server.close()
 

@@ -179,7 +179,7 @@ def run(
         rig=several.settings(),
         anyway=anyway,
     )
-    _check(configuration, given=(camera, target, mounting) != (None, None, None), shown=page.ui or dry_run)
+    _check(configuration, given=(camera, target, mounting) != (None, None, None), dry_run=dry_run)
     if not dry_run:
         if session is None:
             hint = "name a folder to write, or look first with --dry-run"
@@ -187,7 +187,8 @@ def run(
         check_new_folder(session)
     front = _Front(page if not dry_run else Page(), configuration, confirm, as_json=common.json)
     if session is not None and configuration.rig is not None:
-        return run_rig(session, rig_cell(configuration, confirm=front.confirm, observer=front.observer))
+        rig = rig_cell(configuration, confirm=front.confirm, observer=front.observer)
+        return run_rig(session, rig, front.live)
     prepared = prepare(
         configuration,
         camera=None if camera is None else read_camera(camera),
@@ -208,7 +209,7 @@ class _Front:
     def __init__(
         self, page: Page, configuration: Configuration, confirm: bool | None, *, as_json: bool
     ) -> None:
-        self.live = Live(page, configuration.driver, configuration.images) if page.ui else None
+        self.live = Live(page, configuration) if page.ui else None
         if self.live is not None:
             self.person, self.confirm = self.live.person, self.live.confirm
             self.observer: Observer = self.live.observer
@@ -233,7 +234,7 @@ def _resumed(session: Path, confirm: bool | None, page: Page, *, as_json: bool) 
     configuration = Configuration.from_dict(read_settings(session).asked.get("configuration"))
     front = _Front(page, configuration, confirm, as_json=as_json)
     if configuration.rig is not None:
-        return resume_rig(session, front.confirm, front.observer, front.person.tell)
+        return resume_rig(session, front.confirm, front.observer, front.person.tell, front.live)
     loop, store, prepared = go_on(
         session, person=front.person, confirm=front.confirm, observer=front.observer
     )
@@ -242,10 +243,10 @@ def _resumed(session: Path, confirm: bool | None, page: Page, *, as_json: bool) 
     return run_answer(session, configuration, prepared, _driven(loop, store, prepared, front))
 
 
-def _check(configuration: Configuration, *, given: bool, shown: bool) -> None:
+def _check(configuration: Configuration, *, given: bool, dry_run: bool) -> None:
     """Refuse options that do not go together."""
     if configuration.rig is not None:
-        check_rig(configuration, given=given, shown=shown)
+        check_rig(configuration, given=given, dry_run=dry_run)
     if (configuration.driver == SIMULATED) != (configuration.images == SIMULATED):
         raise UsageError("--driver and --images are either both simulated or both not")
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
+from handeye.cli.page import Live
 from handeye.cli.run_answer import found
 from handeye.estimation.confidence import Within
 from handeye.robots.protocol import Goal
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-def check_rig(configuration: Configuration, *, given: bool, shown: bool) -> None:
+def check_rig(configuration: Configuration, *, given: bool, dry_run: bool) -> None:
     """Refuse what does not go with several cameras.
 
     Parameters
@@ -31,8 +32,8 @@ def check_rig(configuration: Configuration, *, given: bool, shown: bool) -> None
         What is asked for.
     given
         Whether a camera, a target or a mounting is stated.
-    shown
-        Whether a page or a dry run is asked for.
+    dry_run
+        Whether nothing shall be done.
 
     Raises
     ------
@@ -46,19 +47,19 @@ def check_rig(configuration: Configuration, *, given: bool, shown: bool) -> None
             hint="leave the other options out; stations of a real rig are taken by its own program, then "
             "handeye import, solve and plan take them all together",
         )
-    if shown or configuration.policy != Configuration.policy:
-        raise UsageError("--rig goes without --ui, --dry-run and --policy")
+    if dry_run or configuration.policy != Configuration.policy:
+        raise UsageError("--rig goes without --dry-run and --policy")
 
 
-def run_rig(folder: Path, prepared: RigPrepared) -> Answer:
-    """Begin a session and run it to its end.
+def run_rig(folder: Path, prepared: RigPrepared, live: Live | None = None) -> Answer:
+    """Begin a session and run it to its end, from the page if there is one.
 
     Raises
     ------
     HandeyeError
         It has no answer, or the folder cannot be written.
     """
-    return _answer(folder, *_run(*begin_rig(prepared, folder), prepared))
+    return _answer(folder, *_run(*begin_rig(prepared, folder), prepared, live))
 
 
 def resume_rig(
@@ -66,6 +67,7 @@ def resume_rig(
     confirm: Callable[[Goal], bool] | None = None,
     observer: Observer | None = None,
     tell: Callable[[str], None] | None = None,
+    live: Live | None = None,
 ) -> Answer:
     """Go on with a session.
 
@@ -79,12 +81,14 @@ def resume_rig(
     )
     if store.notice is not None and tell is not None:
         tell(f"warning: {store.notice}")
-    return _answer(folder, *_run(session, store, prepared))
+    return _answer(folder, *_run(session, store, prepared, live))
 
 
-def _run(session: RigSession, store: RigStore, prepared: RigPrepared) -> tuple[RigPrepared, RigEnd]:
+def _run(
+    session: RigSession, store: RigStore, prepared: RigPrepared, live: Live | None
+) -> tuple[RigPrepared, RigEnd]:
     try:
-        end = session.run()
+        end = session.run() if live is None else live.run(session, store, prepared)
         if prepared.truth is not None:
             store.reveal(prepared.truth)
     finally:

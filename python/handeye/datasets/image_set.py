@@ -38,6 +38,11 @@ class Shot:
     ------
     InputError
         A name that no file can have, or a path that leaves the folder.
+
+    Examples
+    --------
+    >>> Shot("img_1", "pictures/img_1.png", Pose.identity()).image
+    'pictures/img_1.png'
     """
 
     name: str
@@ -122,6 +127,12 @@ class ImageSet:
         What gives the grey values (H, W) of a shot that has no file of its own, by its name.
     written
         How the poses are written, where that was stated; None for formats that leave no choice.
+
+    Examples
+    --------
+    >>> shot = Shot("img_1", "img_1.png", recording.views[0].T_base_flange)
+    >>> ImageSet("mine", "pose-list", Path("mine"), recording.mounting, board, (shot,)).shots[0].image
+    'img_1.png'
     """
 
     name: str
@@ -163,7 +174,7 @@ class ImageSet:
 
 @dataclass(frozen=True, eq=False)
 class UnreadPoses:
-    """Pictures and rows that belong to them, where it is not said what the rows mean.
+    r"""Pictures and rows that belong to them, where it is not said what the rows mean.
 
     Attributes
     ----------
@@ -175,6 +186,14 @@ class UnreadPoses:
         What the rows may mean.
     file
         The file, as the caller would name it.
+
+    Examples
+    --------
+    >>> _ = Path("poses.csv").write_text("0.4,0,0.5,0,0,0\n")
+    >>> rows = read_pose_rows("poses.csv")
+    >>> images = ImageSet("mine", "pose-list", Path(), recording.mounting, board, ())
+    >>> UnreadPoses(images, rows, (), "poses.csv").rows.values.shape
+    (1, 6)
     """
 
     images: ImageSet
@@ -201,6 +220,11 @@ class ImportOptions:
         How these poses are written, as far as it is said.
     arm
         What turns joint positions into poses, where a file has these in their place.
+
+    Examples
+    --------
+    >>> ImportOptions(pattern=(6, 9)).pattern  # the files tell the size of the squares only
+    (6, 9)
     """
 
     target: Target | None = None

@@ -27,6 +27,11 @@ class Importer:
         Reads it; raises `InputError`.
     is_general
         Whether it reads whatever looks like pictures and poses; asked only where no other knows the folder.
+
+    Examples
+    --------
+    >>> IMPORTERS["tum"].recognises(folder)
+    False
     """
 
     name: str

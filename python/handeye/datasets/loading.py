@@ -81,6 +81,11 @@ def load(
     ------
     InputError
         Nothing that can be read, or not what it claims to be.
+
+    Examples
+    --------
+    >>> load(folder).recording.mounting.value
+    'eye_in_hand'
     """
     options = ImportOptions(target, pattern, mounting, poses, stated or NOTHING_STATED, arm)
     folder = _place(path)

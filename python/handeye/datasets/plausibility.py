@@ -30,6 +30,11 @@ class DataWarning:
         A stable lower-case word for scripts.
     message
         What was found, what is usual, and what to do, for a person.
+
+    Examples
+    --------
+    >>> print(DataWarning("few_views", "3 views: ten are a good start").message)
+    3 views: ten are a good start
     """
 
     code: str
@@ -40,7 +45,15 @@ class DataWarning:
 
 
 def recording_warnings(recording: Recording) -> tuple[DataWarning, ...]:
-    """Return what looks wrong with a recording."""
+    """Return what looks wrong with a recording.
+
+    Raises nothing.
+
+    Examples
+    --------
+    >>> recording_warnings(recording)
+    ()
+    """
     warnings = [
         *pose_warnings((view.name, view.T_base_flange) for view in recording.views),
         *target_warnings(recording.target),

@@ -26,6 +26,12 @@ class PoseTable:
         `T_base_flange` of each.
     warnings
         Values that are possible but hardly meant.
+
+    Examples
+    --------
+    >>> table = PoseTable(("home",), (Pose.identity(),))
+    >>> dict(zip(table.names, table.poses))["home"].translation
+    array([0., 0., 0.])
     """
 
     names: tuple[str, ...]
@@ -37,27 +43,46 @@ class PoseTable:
 
 
 def read_pose_rows(path: str | os.PathLike[str]) -> PoseRows:
-    """Read the rows of a CSV, text, JSON, YAML or FileStorage file.
+    r"""Read the rows of a CSV, text, JSON, YAML or FileStorage file.
 
     Raises
     ------
     InputError
         Not such a file, or no poses in it.
+
+    Examples
+    --------
+    >>> _ = Path("poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0,0.5,0,0,0,1\n")
+    >>> read_pose_rows("poses.csv").labels
+    ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
     """
     file = Path(path)
     return (read_pose_document if file.suffix.lower() in SUFFIXES else read_pose_text_file)(file)
 
 
 def read_poses(path: str | os.PathLike[str], stated: Statement | None = None) -> PoseTable:
-    """Read poses where no pictures can tell how they are written, such as candidates for the next view.
+    r"""Read poses where no pictures can tell how they are written, such as candidates for the next view.
 
     Where nothing is stated only our own ways are read: the columns x, y, z, qx, qy, qz, qw or matrices of 16
     numbers by rows, both in metres.
+
+    Parameters
+    ----------
+    path
+        The file.
+    stated
+        How the poses are written; None for our own ways.
 
     Raises
     ------
     InputError
         Not such a file, no pose in it, a pose that is not rigid, or it is not said how the poses are written.
+
+    Examples
+    --------
+    >>> _ = Path("poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0,0.5,0,0,0,1\n")
+    >>> read_poses("poses.csv").poses[0].translation  # metres
+    array([0.4, 0. , 0.5])
     """
     rows = read_pose_rows(path)
     readings = rows.readings(stated)

@@ -24,6 +24,11 @@ class PosePair:
         Pose of the flange in the robot base.
     T_camera_target
         Pose of the target in the camera.
+
+    Examples
+    --------
+    >>> PosePair("station_1", Pose.identity(), Pose.identity()).name
+    'station_1'
     """
 
     name: str
@@ -54,6 +59,12 @@ class PosePairs:
     ------
     InputError
         No station at all, or two of one name.
+
+    Examples
+    --------
+    >>> pair = PosePair("station_1", Pose.identity(), Pose.identity())
+    >>> PosePairs("mine", "text", recording.mounting, (pair,)).motions.shape
+    (1, 4, 4)
     """
 
     name: str

@@ -33,6 +33,12 @@ class Statement:
         Unit of their lengths.
     direction
         Whose pose in which frame.
+
+    Examples
+    --------
+    >>> from handeye.notations import NOTATIONS
+    >>> Statement(NOTATIONS["kuka"]).unit is None  # still to be told
+    True
     """
 
     notation: Notation | None = None
@@ -68,7 +74,14 @@ NOTHING_STATED = Statement()
 
 @dataclass(frozen=True)
 class Reading:
-    """One way to read rows."""
+    """One way to read rows.
+
+    Examples
+    --------
+    >>> from handeye.notations import NOTATIONS, Unit
+    >>> Reading(NOTATIONS["ur"], Unit.MM).options
+    ('--notation', 'ur', '--unit', 'mm')
+    """
 
     notation: Notation
     unit: Unit
@@ -88,7 +101,7 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class PoseRows:
-    """Rows of numbers from a file, one a pose.
+    r"""Rows of numbers from a file, one a pose.
 
     Attributes
     ----------
@@ -112,6 +125,12 @@ class PoseRows:
         What the file calls the accuracies of its poses, which are not read; empty if there are none.
     joints
         (N, n) joint positions of each row, radians; None where they are not known.
+
+    Examples
+    --------
+    >>> _ = Path("poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0,0.5,0,0,0,1\n")
+    >>> read_pose_rows("poses.csv").values.shape
+    (1, 7)
     """
 
     file: Path

@@ -125,7 +125,7 @@ def _configuration(path: Path) -> Mounting | None:
 
 def _named_poses(columns: Sequence[str], table: FloatArray, prefix: str, path: Path) -> FloatArray:
     wanted = [f"{prefix}_{part}" for part in _POSE]
-    missing = [name for name in ("t", *wanted) if name not in columns]
+    missing = [name for name in wanted if name not in columns]
     if missing:
         raise InputError(f"{path}: no column {missing[0]}", code="invalid_field")
     return matrices(tuple(row) for row in table[:, [columns.index(name) for name in wanted]].tolist())
@@ -136,6 +136,10 @@ def _named(path: Path) -> tuple[list[str], FloatArray]:
     columns = [part.strip() for part in lines[0][1].split(",")]
     if len(set(columns)) < len(columns):
         raise InputError(f"{path}: two columns of one name", code="invalid_field")
+    if "t" not in columns:
+        raise InputError(f"{path}: no column t", code="invalid_field")
+    if len(lines) == 1:
+        raise InputError(f"{path}: no poses in it", code="no_poses")
     return columns, _table(path, lines[1:], len(columns), may_miss=True)
 
 

@@ -11,10 +11,22 @@ from handeye.types import Recording, RigRecording
 def check_written(recording: Recording, folder: str | os.PathLike[str]) -> None:
     """Read a recording that was just written back, and compare it.
 
+    Parameters
+    ----------
+    recording
+        What was written.
+    folder
+        Where it was written.
+
     Raises
     ------
     OutputError
         It cannot be read or is not the same, but for images that were not copied and their names.
+
+    Examples
+    --------
+    >>> write_recording(recording, "copy")
+    >>> check_written(recording, "copy")
     """
     try:
         back = read_recording(folder).recording
@@ -33,10 +45,22 @@ def _comparable(recording: Recording) -> tuple[object, ...]:
 def check_written_rig(recording: RigRecording, folder: str | os.PathLike[str]) -> None:
     """Read a recording of several cameras back, and compare it; of one camera and one target as that.
 
+    Parameters
+    ----------
+    recording
+        What was written.
+    folder
+        Where it was written.
+
     Raises
     ------
     OutputError
         As for `check_written`.
+
+    Examples
+    --------
+    >>> write_rig(rig, "copy")
+    >>> check_written_rig(rig, "copy")
     """
     if recording.single is not None:
         check_written(recording.single, folder)

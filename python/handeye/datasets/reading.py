@@ -144,8 +144,11 @@ def read_bytes(path: Path, limit: int) -> bytes:
             status = os.fstat(descriptor)
             if not stat.S_ISREG(status.st_mode):
                 raise InputError(f"{path}: not a regular file", code="unreadable")
-            # Read one byte more than allowed: the file may grow while it is read.
-            content = file.read(limit + 1) if status.st_size <= limit else b""
+            # Reading reserves as much memory as is asked for: the size of the file, and one byte more, as
+            # it may grow while it is read.
+            content = file.read(status.st_size + 1) if status.st_size <= limit else b""
+            if len(content) > status.st_size:
+                content += file.read(limit + 1 - len(content))
     except OSError as error:
         raise InputError(f"{path}: {reason(error)}", code="unreadable") from error
     if status.st_size > limit or len(content) > limit:

@@ -67,6 +67,12 @@ class LoadedRecording:
         Where it was read from; images are relative to it.
     warnings
         Values that are possible but hardly meant.
+
+    Examples
+    --------
+    >>> loaded = read_recording(folder)
+    >>> len(loaded.recording), loaded.warnings
+    (9, ())
     """
 
     recording: Recording

@@ -50,5 +50,10 @@ def holds_several(folder: Path) -> bool:
     ------
     InputError
         No recording of a version that this program reads.
+
+    Examples
+    --------
+    >>> holds_several(folder)
+    False
     """
     return read_versioned(folder / FILE_NAME)["version"] == RIG_VERSION

@@ -80,7 +80,14 @@ class _RigDocument(Document):
 
 @dataclass(frozen=True)
 class LoadedRig:
-    """A recording of several cameras or targets, its folder, and what looks wrong with it."""
+    """A recording of several cameras or targets, its folder, and what looks wrong with it.
+
+    Examples
+    --------
+    >>> write_rig(rig, "rig")
+    >>> sorted(read_rig("rig").recording.cameras)
+    ['front', 'left', 'right', 'side']
+    """
 
     recording: RigRecording
     folder: Path
@@ -94,6 +101,12 @@ def read_rig(folder: str | os.PathLike[str]) -> LoadedRig:
     ------
     InputError
         As for `read_recording`; the message names file, station, view and field.
+
+    Examples
+    --------
+    >>> write_rig(rig, "rig")
+    >>> len(read_rig("rig").recording) == len(rig)
+    True
     """
     root = existing_folder(folder)
     file = root / FILE_NAME
@@ -115,7 +128,15 @@ def read_rig(folder: str | os.PathLike[str]) -> LoadedRig:
 
 
 def rig_warnings(recording: RigRecording) -> tuple[DataWarning, ...]:
-    """Return what is possible but hardly meant in the views of any pair, each said once."""
+    """Return what is possible but hardly meant in the views of any pair, each said once.
+
+    Raises nothing.
+
+    Examples
+    --------
+    >>> rig_warnings(rig)
+    ()
+    """
     found = [
         warning
         for camera, target in recording.pairs

@@ -23,10 +23,25 @@ def write_rig(
 ) -> None:
     """Write a recording into a new folder: version 1 where there is one camera and one target.
 
+    Parameters
+    ----------
+    recording
+        Several cameras or targets.
+    folder
+        A new folder.
+    images_from
+        Folder from which the images of the views are copied; None to leave them where they are.
+
     Raises
     ------
     OutputError
         The folder is not empty, an image is missing, or the system refuses to write.
+
+    Examples
+    --------
+    >>> write_rig(rig, "rig")
+    >>> Path("rig/recording.toml").exists()
+    True
     """
     single = recording.single
     if single is not None:

@@ -38,6 +38,11 @@ class Detection:
     ------
     InputError
         Wrong shapes, a pixel that is not finite, or a point twice.
+
+    Examples
+    --------
+    >>> Detection([0, 1], [[10.0, 20.0], [30.0, 20.0]]).pixels.shape
+    (2, 2)
     """
 
     point_ids: IndexArray
@@ -75,7 +80,13 @@ class Detection:
 
 
 class Reason(StrEnum):
-    """Why a target was not found, as far as the image tells."""
+    """Why a target was not found, as far as the image tells.
+
+    Examples
+    --------
+    >>> Reason("blurred") is Reason.BLURRED
+    True
+    """
 
     IMAGE_TOO_SMALL = "image_too_small"
     UNDEREXPOSED = "underexposed"
@@ -121,6 +132,12 @@ class NotFound:
         The board that the picture shows instead; lengths that it does not tell are those described.
     advice
         How to describe it; empty for what usually helps.
+
+    Examples
+    --------
+    >>> missed = detect(np.full((480, 640), 255, np.uint8), board)
+    >>> missed.reason.value
+    'overexposed'
     """
 
     reason: Reason
@@ -139,7 +156,23 @@ class NotFound:
 
 
 def relabeled(detection: Detection, permutation: IndexArray) -> Detection:
-    """Return the detection with point i called `permutation[i]`, as the symmetries of a target have it."""
+    """Return the detection with point i called `permutation[i]`, as the symmetries of a target have it.
+
+    Raises nothing.
+
+    Parameters
+    ----------
+    detection
+        The points.
+    permutation
+        (P,) the new name of every point of the target.
+
+    Examples
+    --------
+    >>> swapped = relabeled(Detection([0, 1], [[10, 20], [30, 20]]), np.array([1, 0]))
+    >>> swapped.point_ids
+    array([1, 0])
+    """
     return replace(detection, point_ids=permutation[detection.point_ids])
 
 

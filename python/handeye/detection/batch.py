@@ -20,7 +20,14 @@ WAITING = 4
 
 
 class DetectionCache:
-    """What was found, in memory only, by content of the image, target and version of the detectors."""
+    """What was found, in memory only, by content of the image, target and version of the detectors.
+
+    Examples
+    --------
+    >>> cache = DetectionCache()
+    >>> type(cache.detect(np.full((480, 640), 255, np.uint8), board)).__name__
+    'NotFound'
+    """
 
     def __init__(self) -> None:
         self._found: dict[tuple[bytes, tuple[int, ...], Target, int], Detection | NotFound] = {}
@@ -51,6 +58,11 @@ class Batch:
         The detections, in the order of the images.
     failed
         The error of every other image: it could not be read, or the target was not found in it.
+
+    Examples
+    --------
+    >>> Batch().found, Batch().failed
+    ({}, {})
     """
 
     found: Mapping[str, Detection] = field(default_factory=dict[str, Detection])
@@ -88,6 +100,8 @@ def detect_all(
     busy the machine is. Whatever `progress` raises, an interruption too, ends the work after the images that
     are being looked at.
 
+    Raises nothing of its own; errors of images are in the answer.
+
     Parameters
     ----------
     images
@@ -101,6 +115,12 @@ def detect_all(
         Remembers what was found before; a new one by default.
     workers
         Threads, at least one; by default one for each processor.
+
+    Examples
+    --------
+    >>> white = np.full((480, 640), 255, np.uint8)
+    >>> list(detect_all([("img_1", lambda: white)], board).failed)
+    ['img_1']
     """
     memory = DetectionCache() if cache is None else cache
     count = max(1, workers or processors())

@@ -67,7 +67,15 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
 
 
 def shown_board(image: Image) -> Target | None:
-    """Return the board that an image shows, of lengths that are not known; None if it shows none."""
+    """Return the board that an image shows, of lengths that are not known; None if it shows none.
+
+    Raises nothing.
+
+    Examples
+    --------
+    >>> print(shown_board(np.full((480, 640), 255, np.uint8)))
+    None
+    """
     # Small markers only show in the whole picture.
     for side_px in (SEARCH_SIDE_PX, max(image.shape)):
         for board, _ in _visible(image, UNKNOWN, fewest_markers=1, side_px=side_px):
@@ -219,7 +227,16 @@ def _difference(target: Target, shown: Target) -> str:
 
 
 def without_lengths(board: Target) -> str:
-    """Return a board in words, without what a picture does not tell."""
+    """Return a board in words, without what a picture does not tell.
+
+    Raises nothing.
+
+    Examples
+    --------
+    >>> from handeye.types import Chessboard
+    >>> without_lengths(Chessboard(6, 9, 0.025))
+    'chessboard, rows 6, columns 9'
+    """
     fields = board.to_dict()
     family = fields.pop("family")
     told = [f"{name} {_toml(value)}" for name, value in fields.items() if not name.endswith("_m")]

@@ -27,6 +27,23 @@ def drawn_over(image: Image, target: Target | None, outcome: Detection | NotFoun
     """Return an image (H, W, 3), blue first, with points, their ids and the axes of the target.
 
     The x axis is red and the y axis green. Where nothing was found, the image says why.
+
+    Raises nothing.
+
+    Parameters
+    ----------
+    image
+        (H, W) grey values.
+    target
+        What was looked for; None for none.
+    outcome
+        What came of it.
+
+    Examples
+    --------
+    >>> white = np.full((480, 640), 255, np.uint8)
+    >>> drawn_over(white, board, detect(white, board)).shape
+    (480, 640, 3)
     """
     picture = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     size = max(2, round(SIZE * max(image.shape)))

@@ -61,6 +61,12 @@ class CameraCalibration:
         `T_camera_target` of each view.
     rejected
         Views that could not be used, and why.
+
+    Examples
+    --------
+    >>> found = {view.name: Detection(view.point_ids, view.pixels) for view in recording.views}
+    >>> calibrate_camera(board, found, camera.size_px).rmse_px < 1.0
+    True
     """
 
     camera: Camera
@@ -104,6 +110,12 @@ def calibrate_camera(
         The views do not determine the camera: all face the board squarely, or too few for such a lens.
     SolveError
         The iteration does not converge.
+
+    Examples
+    --------
+    >>> found = {view.name: Detection(view.point_ids, view.pixels) for view in recording.views}
+    >>> calibrate_camera(board, found, camera.size_px, lens="pinhole").camera.lens
+    'pinhole'
     """
     if lens is not None and lens not in LENSES:
         raise InputError(f"lens {lens!r}, expected one of {', '.join(LENSES)}", code="unknown_lens")

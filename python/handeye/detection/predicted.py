@@ -32,6 +32,11 @@ class Prediction:
     ------
     InputError
         Wrong shapes, or a margin below zero.
+
+    Examples
+    --------
+    >>> Prediction(np.zeros((len(board.points), 2)), margin_px=20.0).margin_px
+    20.0
     """
 
     pixels: FloatArray

@@ -38,6 +38,11 @@ class AutoOptions:
         Points that were touched.
     play
         Whether the joints have play, and came to every view straight from the one before.
+
+    Examples
+    --------
+    >>> AutoEstimator(AutoOptions(camera_fixed=True))(measurements).free_camera
+    ()
     """
 
     kinematics: Kinematics | None = None
@@ -48,7 +53,13 @@ class AutoOptions:
 
 @dataclass(frozen=True)
 class AutoEstimator:
-    """Estimates with the default model."""
+    """Estimates with the default model.
+
+    Examples
+    --------
+    >>> AutoEstimator()(measurements).determined
+    True
+    """
 
     options: AutoOptions = AutoOptions()
 

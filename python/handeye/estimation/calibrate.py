@@ -33,7 +33,27 @@ def make_estimator(
     camera_fixed: bool = False,
     probing: Probing | None = None,
 ) -> Estimator:
-    """Return what estimates under a model's assumptions; the paper's has no use for arm or touches."""
+    """Return what estimates under a model's assumptions; the paper's has no use for arm or touches.
+
+    Raises nothing.
+
+    Parameters
+    ----------
+    model
+        Noise from the data, or robot and camera as exact.
+    kinematics
+        The arm, if it is known.
+    camera_fixed
+        Hold the camera as it is given.
+    probing
+        Points that were touched.
+
+    Examples
+    --------
+    >>> from handeye.types.calibration import ModelName
+    >>> make_estimator(ModelName.PAPER)(measurements).model.value
+    'paper'
+    """
     if ModelName(model) is ModelName.PAPER:
         return paper_estimate
     return AutoEstimator(AutoOptions(kinematics, camera_fixed, probing))
@@ -114,7 +134,35 @@ def calibrate(
     work: Work | None = None,
     probing: Probing | None = None,
 ) -> Calibration:
-    """Calibrate from measurements; see `solve`."""
+    """Calibrate from measurements; see `solve`.
+
+    Parameters
+    ----------
+    measurements
+        Views of one target through one camera.
+    model
+        Noise from the data, or robot and camera as exact.
+    reduced
+        For the paper's model: the camera is not refined.
+    kinematics
+        The arm, if it is known.
+    camera_fixed
+        Hold the camera as it is given.
+    work
+        What is touched, for the touch error.
+    probing
+        Points that were touched.
+
+    Raises
+    ------
+    HandeyeError
+        As `solve`.
+
+    Examples
+    --------
+    >>> calibrate(measurements).mounting.value
+    'eye_in_hand'
+    """
     check_views(measurements)
     return calibrate_examined(
         examine(measurements),
@@ -137,7 +185,26 @@ def calibrate_examined(
     work: Work | None = None,
     probing: Probing | None = None,
 ) -> Calibration:
-    """Calibrate from measurements whose mistakes have been looked for; see `solve`."""
+    """Calibrate from measurements whose mistakes have been looked for; see `solve`.
+
+    Parameters
+    ----------
+    examination
+        Measurements without those that are wrong, and what was found.
+    model, reduced, kinematics, camera_fixed, work, probing
+        As for `calibrate`.
+
+    Raises
+    ------
+    HandeyeError
+        As `solve`.
+
+    Examples
+    --------
+    >>> from handeye.estimation.faults import examine
+    >>> len(calibrate_examined(examine(measurements)).used)
+    9
+    """
     measurements = examination.measurements
     check_views(measurements)
     estimate = make_estimator(model, kinematics, camera_fixed=camera_fixed, probing=probing)(measurements)
@@ -160,6 +227,10 @@ def require_determined(estimate: Estimate) -> None:
     ------
     DegenerateError
         The message names what is open, the hint how to cure it.
+
+    Examples
+    --------
+    >>> require_determined(estimate)
     """
     if not estimate.determined:
         sentences = list(dict.fromkeys(direction.sentence for direction in estimate.unobservable))
@@ -167,7 +238,23 @@ def require_determined(estimate: Estimate) -> None:
 
 
 def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibration:
-    """Return the calibration of an estimate: residuals of every view, covariance, warnings."""
+    """Return the calibration of an estimate: residuals of every view, covariance, warnings.
+
+    Raises nothing.
+
+    Parameters
+    ----------
+    measurements
+        The views.
+    estimate
+        What is believed after them.
+
+    Examples
+    --------
+    >>> calibration = to_calibration(measurements, estimate)
+    >>> calibration.covariance.shape  # (metres, radians) squared
+    (6, 6)
+    """
     rmse = view_rmse_px(measurements, estimate)
     views = [
         ViewResult(view.name, float(value)) for view, value in zip(measurements.views, rmse, strict=True)

@@ -94,6 +94,13 @@ class Estimate:
         Tips of touches where they were found, by name.
     unobservable
         Directions of X and Y that the views leave open; a weak prior stands in for them.
+
+    Examples
+    --------
+    >>> estimate.covariance.shape[0] >= 12
+    True
+    >>> estimate.within_95.translation_mm < 10.0
+    True
     """
 
     mounting: Mounting
@@ -208,7 +215,14 @@ def side_of_chain(mounting: Mounting, side: RobotSide) -> str | None:
 
 
 class Estimator(Protocol):
-    """Turns measurements into an estimate; a previous one helps as a start."""
+    """Turns measurements into an estimate; a previous one helps as a start.
+
+    Examples
+    --------
+    >>> estimator = AutoEstimator()  # is one; so is `paper_estimate`
+    >>> estimator(measurements).model.value, paper_estimate(measurements).model.value
+    ('auto', 'paper')
+    """
 
     def __call__(self, measurements: Measurements, previous: Estimate | None = None) -> Estimate:
         """Estimate from these measurements."""

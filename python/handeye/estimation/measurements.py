@@ -12,7 +12,7 @@ from handeye.types.arrays import FloatArray
 from handeye.types.camera import Camera
 from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
-from handeye.types.recording import Recording
+from handeye.types.recording import Recording, check_points
 from handeye.types.target import Target
 from handeye.types.view import View
 
@@ -33,6 +33,11 @@ class ViewPose:
         (6, 6) information of the pose's left perturbation at a pixel noise of 1 px.
     mirrored
         The second minimum of a planar target, and its `rmse_px`; None if there is only one.
+
+    Examples
+    --------
+    >>> measurements.poses[0].information.shape
+    (6, 6)
     """
 
     T_camera_target: Pose
@@ -49,15 +54,30 @@ class ViewPose:
 def view_pose(camera: Camera, target: Target, view: View) -> ViewPose:
     """Find the pose of the target in one view.
 
+    Parameters
+    ----------
+    camera
+        The camera.
+    target
+        The target.
+    view
+        At least four of its points.
+
     Raises
     ------
     InputError, DegenerateError, SolveError
         Fewer than four points, points on a line, or no pose that fits; the message names the view.
+
+    Examples
+    --------
+    >>> view_pose(camera, board, recording.views[0]).rmse_px < 1.0
+    True
     """
     if len(view) < MIN_POINTS:
         raise InputError(
             f"view {view.name}: {len(view)} points, at least {MIN_POINTS} are needed", code="too_few_points"
         )
+    check_points(view, target)
     points = target.points[view.point_ids]
     radii = target.radii_m[view.point_ids]
     try:
@@ -75,6 +95,12 @@ class Measurements:
 
     Views whose pose cannot be found alone do not belong here: `Measurements.of` leaves them out and says so
     in `rejected`.
+
+    Examples
+    --------
+    >>> measured = Measurements.of_recording(recording)
+    >>> len(measured), measured.motions.shape
+    (9, (9, 4, 4))
     """
 
     mounting: Mounting

@@ -31,12 +31,24 @@ def paper_estimate(measurements: Measurements, previous: Estimate | None = None)
 
     Views that do not determine the answer are completed by a weak prior, and `determined` is False.
 
+    Parameters
+    ----------
+    measurements
+        At least three views.
+    previous
+        An earlier estimate to start from.
+
     Raises
     ------
     InputError
         Fewer than three views.
     SolveError
         The iteration diverged from every start.
+
+    Examples
+    --------
+    >>> paper_estimate(measurements).X.matrix.shape
+    (4, 4)
     """
     check_views(measurements)
     sigma = pixel_sigma(measurements)

@@ -27,6 +27,12 @@ class RigMeasurements:
         are the identity.
     views
         One view of every station by its name, with the robot's pose as reported, in order.
+
+    Examples
+    --------
+    >>> measured = RigMeasurements.of(rig)
+    >>> measured.moves("left", "table"), measured.moves("front", "table")
+    (True, False)
     """
 
     cameras: Mapping[str, MountedCamera]

@@ -29,6 +29,11 @@ class Exporter:
         Usual end of the name of a file of this kind.
     text
         Writes the transform, comments included.
+
+    Examples
+    --------
+    >>> EXPORTERS["urdf"].suffix
+    '.urdf'
     """
 
     name: str

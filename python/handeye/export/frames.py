@@ -62,6 +62,11 @@ class Frames:
     ------
     InputError
         A name that some format cannot hold, or two frames of one name.
+
+    Examples
+    --------
+    >>> Frames("tool0", robot="base_link").camera
+    'camera_optical_frame'
     """
 
     parent: str

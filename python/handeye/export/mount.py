@@ -25,6 +25,11 @@ class Mount:
 
     A frame has one parent only. Where the camera's driver publishes the optical frame below a link of its
     own, it is the link that hangs on the robot: ``T_parent_link = T_parent_camera (T_link_camera)^-1``.
+
+    Examples
+    --------
+    >>> Mount(result, Frames("tool0")).child
+    'camera_optical_frame'
     """
 
     result: Result

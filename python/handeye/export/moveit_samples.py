@@ -21,6 +21,11 @@ def moveit_samples(recording: Recording) -> str:
     ------
     InputError
         There is no such view.
+
+    Examples
+    --------
+    >>> moveit_samples(recording).count("effector_wrt_world")
+    9
     """
     measurements = Measurements.of_recording(recording)
     if len(measurements) == 0:

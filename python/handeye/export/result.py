@@ -46,6 +46,11 @@ class Result:
         How sure the covariance itself is.
     solved
         All that the solve said; None where it was not one of pictures.
+
+    Examples
+    --------
+    >>> 1e3 * result.sigma_translation_m < 10.0  # mm
+    True
     """
 
     mounting: Mounting
@@ -97,6 +102,14 @@ def read_result(path: str | os.PathLike[str], camera: str | None = None) -> Resu
     ------
     InputError
         Not such a file; the message names file and field. Or a camera that is not in it.
+
+    Examples
+    --------
+    >>> import json
+    >>> from handeye.estimation import solve
+    >>> _ = Path("answer.json").write_text(json.dumps(solve(recording).to_dict()))
+    >>> read_result("answer.json").mounting.value
+    'eye_in_hand'
     """
     file = Path(path)
     document = read_document(_of_camera(_read_json(file), camera, file), Solved, str(file))

@@ -34,7 +34,14 @@ _FRAMES = ("--frame-id", "--child-frame-id")
 
 @dataclass(frozen=True)
 class Transform:
-    """A transform between two named frames: coordinates in the child to coordinates in the parent."""
+    """A transform between two named frames: coordinates in the child to coordinates in the parent.
+
+    Examples
+    --------
+    >>> from handeye.types import Pose
+    >>> Transform("tool0", "camera", Pose.identity()).child
+    'camera'
+    """
 
     parent: str
     child: str
@@ -48,6 +55,12 @@ def read_transform(path: str | os.PathLike[str]) -> Transform:
     ------
     InputError
         None of these formats, or numbers that are no rigid transform.
+
+    Examples
+    --------
+    >>> _ = Path("camera.urdf").write_text(checked_text(EXPORTERS["urdf"], Mount(result, Frames("tool0"))))
+    >>> read_transform("camera.urdf").parent
+    'tool0'
     """
     file = Path(path)
     with located(str(file)):
@@ -76,10 +89,22 @@ def transform_of(text: str) -> Transform:
 def checked_text(exporter: Exporter, mount: Mount) -> str:
     """Return the text of an exporter after it was read back and compared.
 
+    Parameters
+    ----------
+    exporter
+        One of `EXPORTERS`.
+    mount
+        The answer, in named frames.
+
     Raises
     ------
     OutputError
         It does not read back to the same transform; that would be a mistake in handeye.
+
+    Examples
+    --------
+    >>> checked_text(EXPORTERS["urdf"], Mount(result, Frames("tool0"))).count("<origin")
+    1
     """
     text = exporter.text(mount)
     try:

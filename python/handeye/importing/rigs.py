@@ -95,8 +95,10 @@ def open_rig(
 
     Examples
     --------
-    >>> rig = open_rig("my_rig")  # doctest: +SKIP
-    >>> sorted(rig.recording.cameras)  # doctest: +SKIP
+    >>> from handeye.datasets import write_rig
+    >>> write_rig(rig, "my_rig")
+    >>> sorted(open_rig("my_rig").recording.cameras)
+    ['front', 'left', 'right', 'side']
     """
     folder = Path(path)
     folder = folder.parent if is_file(folder) else folder

@@ -14,7 +14,13 @@ from handeye.types.view import View
 
 @dataclass(frozen=True)
 class Candidate:
-    """A robot pose that could be taken, by name, with the joint positions that reach it if they are known."""
+    """A robot pose that could be taken, by name, with the joint positions that reach it if they are known.
+
+    Examples
+    --------
+    >>> Candidate("left_high", recording.views[0].T_base_flange).joints_rad is None
+    True
+    """
 
     name: str
     T_base_flange: Pose
@@ -29,6 +35,12 @@ class Pool:
     ------
     InputError
         Two candidates of one name.
+
+    Examples
+    --------
+    >>> pool = Pool.of_views(recording.views)
+    >>> len(pool), pool.motions(recording.mounting).shape
+    (9, (9, 4, 4))
     """
 
     candidates: tuple[Candidate, ...]

@@ -30,6 +30,12 @@ class Proposal:
         Gain that the criterion predicts for it.
     gains
         (N,) gains of all candidates that were left, by `names`; NaN for infeasible ones.
+
+    Examples
+    --------
+    >>> candidate = Candidate("left_high", recording.views[0].T_base_flange)
+    >>> Proposal(candidate, 0.7, np.array([0.7]), ("left_high",)).candidate.name
+    'left_high'
     """
 
     candidate: Candidate
@@ -50,6 +56,11 @@ class Verdict:
         Gain that was predicted for it; NaN for a view that was not proposed.
     realised_gain
         By how much the entropy of all parameters fell; NaN if it was not finite before.
+
+    Examples
+    --------
+    >>> Verdict(estimate, predicted_gain=0.7, realised_gain=0.6).realised_gain
+    0.6
     """
 
     estimate: Estimate
@@ -79,6 +90,11 @@ class PlannerOptions:
         None to take the estimate at its word.
     travel
         Where the arm stands and how fast it is, for policies that weigh time; None if that is not known.
+
+    Examples
+    --------
+    >>> PlannerOptions(policy=make_policy("random"), seed=3).policy.name
+    'random'
     """
 
     policy: Policy = field(default_factory=NextBestView)
@@ -108,6 +124,13 @@ class Planner:
     ------
     InputError
         Fewer than three views.
+
+    Examples
+    --------
+    >>> from handeye.estimation import AutoEstimator
+    >>> planner = Planner(measurements.select(range(4)), Pool.of_views(recording.views[4:]), AutoEstimator())
+    >>> planner.ask().predicted_gain > 0
+    True
     """
 
     def __init__(
@@ -231,7 +254,29 @@ class Planner:
 
 
 def replay(planner: Planner, views: Sequence[View]) -> list[Proposal | Stop]:
-    """Run the loop on recorded views until it stops; the planner's candidates carry the views' names."""
+    """Run the loop on recorded views until it stops; the planner's candidates carry the views' names.
+
+    Parameters
+    ----------
+    planner
+        Begun, its candidates by the names of the views.
+    views
+        Recorded views.
+
+    Raises
+    ------
+    HandeyeError
+        As the planner and its estimator.
+
+    Examples
+    --------
+    >>> from handeye.estimation import AutoEstimator
+    >>> options = PlannerOptions(stop_rules=(NumberOfViews(5),), sight=Sight(known=True))
+    >>> pool = Pool.of_views(recording.views[4:])
+    >>> planner = Planner(measurements.select(range(4)), pool, AutoEstimator(), options)
+    >>> replay(planner, recording.views)[-1].reason.value
+    'views_taken'
+    """
     by_name = {view.name: view for view in views}
     history: list[Proposal | Stop] = []
     while True:

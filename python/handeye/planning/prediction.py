@@ -29,6 +29,11 @@ class Sight:
     known
         The candidates are recorded views that are known to show the target: nothing is checked but that the
         lens can see it at the current estimate.
+
+    Examples
+    --------
+    >>> Sight(margin_px=10.0, fewest=20).fewest
+    20
     """
 
     margin_px: float = 0.0
@@ -50,6 +55,12 @@ class Prediction:
     ------
     DegenerateError
         The information is singular.
+
+    Examples
+    --------
+    >>> pool = Pool.of_views(recording.views)
+    >>> Prediction(estimate, Sight(known=True)).covariances(pool.motions(recording.mounting)).shape
+    (9, 6, 6)
     """
 
     def __init__(self, estimate: Estimate, sight: Sight) -> None:

@@ -30,6 +30,12 @@ class Prospect:
         Gain by the criterion that was asked for.
     covariance
         (6, 6) covariance of the twist of X predicted after it.
+
+    Examples
+    --------
+    >>> candidate = Candidate("left_high", recording.views[0].T_base_flange)
+    >>> 1e3 * Prospect(candidate, 0.7, 1e-8 * np.eye(6)).sigma_translation_m
+    0.17...
     """
 
     candidate: Candidate
@@ -59,6 +65,14 @@ class Ranking:
         Name of each candidate that cannot be used, and why.
     feasible_count
         Number of feasible candidates, also those beyond the number asked for.
+
+    Examples
+    --------
+    >>> from handeye import _core
+    >>> pool = Pool.of_views(recording.views)
+    >>> ranking = rank(estimate, pool, _core.Criterion("entropy"), Sight(known=True))
+    >>> ranking.feasible_count
+    9
     """
 
     prospects: tuple[Prospect, ...]
@@ -96,6 +110,14 @@ def rank(
     ------
     DegenerateError
         The information of the views is singular.
+
+    Examples
+    --------
+    >>> from handeye import _core
+    >>> pool = Pool.of_views(recording.views)
+    >>> best = rank(estimate, pool, _core.Criterion("entropy"), Sight(known=True), top=3).prospects
+    >>> best[0].gain >= best[2].gain
+    True
     """
     sight = sight or Sight()
     if len(pool) == 0:

@@ -16,7 +16,13 @@ from handeye.types.arrays import FloatArray
 
 
 class StopReason(StrEnum):
-    """Why planning ended."""
+    """Why planning ended.
+
+    Examples
+    --------
+    >>> StopReason("no_candidate") is StopReason.NO_CANDIDATE
+    True
+    """
 
     VIEWS_TAKEN = "views_taken"
     GAIN_BELOW_THRESHOLD = "gain_below_threshold"
@@ -27,7 +33,13 @@ class StopReason(StrEnum):
 
 @dataclass(frozen=True)
 class Stop:
-    """The end of planning, with its evidence."""
+    """The end of planning, with its evidence.
+
+    Examples
+    --------
+    >>> Stop(StopReason.VIEWS_TAKEN, "12 views taken, as asked").reason.value
+    'views_taken'
+    """
 
     reason: StopReason
     sentence: str
@@ -54,7 +66,13 @@ class State:
 
 
 class StopRule(ABC):
-    """Looks at the state before a proposal is made."""
+    """Looks at the state before a proposal is made.
+
+    Examples
+    --------
+    >>> isinstance(NumberOfViews(12), StopRule)
+    True
+    """
 
     @abstractmethod
     def verdict(self, state: State) -> Stop | None:
@@ -69,6 +87,11 @@ class NumberOfViews(StopRule):
     ------
     InputError
         Fewer than three.
+
+    Examples
+    --------
+    >>> NumberOfViews(12).views
+    12
     """
 
     views: int
@@ -87,7 +110,13 @@ class NumberOfViews(StopRule):
 
 @dataclass(frozen=True)
 class GainThreshold(StopRule):
-    """Stop when the best candidate gains too little (Yang, Rebello and Waslander 2023, eq. 15)."""
+    """Stop when the best candidate gains too little (Yang, Rebello and Waslander 2023, eq. 15).
+
+    Examples
+    --------
+    >>> GainThreshold(0.1).threshold_nats
+    0.1
+    """
 
     threshold_nats: float
 
@@ -105,7 +134,13 @@ class GainThreshold(StopRule):
 
 @dataclass(frozen=True)
 class Accuracy(StopRule):
-    """Stop when the predicted standard deviations of the hand-eye are small enough."""
+    """Stop when the predicted standard deviations of the hand-eye are small enough.
+
+    Examples
+    --------
+    >>> Accuracy(sigma_translation_mm=0.2, sigma_rotation_deg=0.02).sigma_translation_mm
+    0.2
+    """
 
     sigma_translation_mm: float
     sigma_rotation_deg: float
@@ -136,6 +171,11 @@ class ToolAccuracy(StopRule):
         (P, 3) points in the camera frame, metres: a tool centre point, or the corners of a working box.
     sigma_mm
         What the worst of them may have.
+
+    Examples
+    --------
+    >>> ToolAccuracy(np.array([[0.0, 0.0, 0.2]]), sigma_mm=0.3).points_camera_m.shape
+    (1, 3)
     """
 
     points_camera_m: FloatArray

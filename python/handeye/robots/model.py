@@ -34,6 +34,12 @@ class Joint:
         Limits of its position; infinite if there are none.
     velocity
         Largest speed per second; infinite if unknown.
+
+    Examples
+    --------
+    >>> from handeye.types import Pose
+    >>> Joint("shoulder", Pose.identity(), lower=-2.0, upper=2.0).sliding
+    False
     """
 
     name: str
@@ -64,6 +70,13 @@ class Arm:
     ------
     InputError
         No joint or more than 16, two of one name, an axis without direction, limits in the wrong order.
+
+    Examples
+    --------
+    >>> arm.forward(np.zeros(len(arm))).shape  # metres
+    (4, 4)
+    >>> arm.within_limits(np.zeros(len(arm)))
+    True
     """
 
     name: str
@@ -280,8 +293,29 @@ def denavit_hartenberg(
 ) -> Arm:
     """Return an arm from standard parameters (Denavit and Hartenberg 1955): a (m), d (m), alpha, offset.
 
-    Joint i: ``T = Rz(q + offset) Tz(d) Tx(a) Rx(alpha)``; all joints turn. `limits` (n, 2) in radians,
-    `velocities` (n,) in radians per second.
+    Joint i: ``T = Rz(q + offset) Tz(d) Tx(a) Rx(alpha)``; all joints turn.
+
+    Parameters
+    ----------
+    name
+        What the arm is called.
+    rows
+        (n, 4) of the joints, base first: a and d in metres, alpha and offset in radians.
+    limits
+        (n, 2) lowest and highest position, radians.
+    velocities
+        (n,) largest speeds, radians per second.
+
+    Raises
+    ------
+    InputError
+        As `Arm`; or limits and speeds that are not one for each joint.
+
+    Examples
+    --------
+    >>> two = denavit_hartenberg("planar", [(0.3, 0, 0, 0), (0.2, 0, 0, 0)], [(-3, 3)] * 2, [1.0, 1.0])
+    >>> two.reach_m
+    0.5
     """
     before = Pose.identity()
     joints: list[Joint] = []

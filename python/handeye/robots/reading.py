@@ -32,15 +32,22 @@ def typed_reading(answer: object) -> Reading:
     """
     if not isinstance(answer, Reading):
         raise _bad(f"read_pose returns {type(answer).__name__}, expected Reading")
-    if not isinstance(answer.T_base_flange, Pose):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise _bad(f"T_base_flange is {type(answer.T_base_flange).__name__}, expected Pose")
-    if answer.joints_rad is None:
-        return answer
     try:
-        joints = finite_array(answer.joints_rad, (None,), "joints_rad")
+        return _plain(answer)
     except InputError as error:
         raise _bad(error.message) from error
-    return Reading(answer.T_base_flange, tuple(joints.tolist()))
+    except Exception as error:
+        raise _bad(f"unreadable ({type(error).__name__})") from error
+
+
+def _plain(answer: Reading) -> Reading:
+    pose, joints = answer.T_base_flange, answer.joints_rad
+    if not isinstance(pose, Pose):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError(f"T_base_flange is {type(pose).__name__}, expected Pose")
+    pose.inverse()  # raises where there is no matrix in it
+    if joints is None:
+        return Reading(pose)
+    return Reading(pose, tuple(finite_array(joints, (None,), "joints_rad").tolist()))
 
 
 def checked_reading(

@@ -14,7 +14,15 @@ _SUFFIX = ".urdf"
 
 
 def shipped_arms() -> tuple[str, ...]:
-    """Return the names of the arms that are described in this package."""
+    """Return the names of the arms that are described in this package.
+
+    Raises nothing.
+
+    Examples
+    --------
+    >>> "ur5e" in shipped_arms()
+    True
+    """
     folder = resources.files("handeye.robots") / "arms"
     return tuple(
         sorted(file.name.removesuffix(_SUFFIX) for file in folder.iterdir() if file.name.endswith(_SUFFIX))
@@ -35,6 +43,11 @@ def open_arm(name_or_file: str | os.PathLike[str], *, base: str | None = None, t
     ------
     InputError
         No such arm or file, or the file cannot be used.
+
+    Examples
+    --------
+    >>> open_arm("ur5e").joint_names[0]
+    'shoulder_pan_joint'
     """
     text = os.fspath(name_or_file)
     names = shipped_arms()

@@ -37,7 +37,13 @@ STILL_M, STILL_RAD = 1e-5, 1e-4
 
 @dataclass(frozen=True)
 class Timeouts:
-    """How long drivers may take, in seconds, and how far off a motion may end to count as reached."""
+    """How long drivers may take, in seconds, and how far off a motion may end to count as reached.
+
+    Examples
+    --------
+    >>> Timeouts(move_s=120.0).reached_m  # metres
+    0.002
+    """
 
     move_s: float = 60.0
     read_s: float = 5.0
@@ -125,6 +131,13 @@ class Cell:
         Told of what happens.
     several
         All cameras and the targets that they may see, where there is more than one of either.
+
+    Examples
+    --------
+    >>> from handeye.robots import open_arm
+    >>> cell = simulated_cell(open_arm("ur5e")).cell
+    >>> len(cell.read().joints_rad)  # radians
+    6
     """
 
     robot: Robot
@@ -243,8 +256,12 @@ def look(
         return Missed(known.get(error.code, Failure.CAMERA_FAILED), error.message, moved=True)
     timings["grab"] = timings.get("grab", 0.0) + time.monotonic() - started
     started = time.monotonic()
+    if frame.image is not None and frame.image.shape == eye.camera.size_px[::-1]:
+        # A driver may write its next picture into the same buffer.
+        frame = replace(frame, image=frame.image.copy())
     found = _look(eye, frame, digests, predicted)
-    cell.observer.looked(label, frame.image, None if isinstance(found, Missed) else found[0])
+    seen = None if isinstance(found, Missed) else found[0]
+    cell.observer.looked(label, frame.image, seen, eye.name)
     timings["detect"] = timings.get("detect", 0.0) + time.monotonic() - started
     if isinstance(found, Missed):
         return found

@@ -102,12 +102,17 @@ class Calls:
         raise self._described(answer) from answer
 
     def _described(self, error: BaseException) -> DeviceError:
-        """Return an error of a driver as one of ours: short, and of characters that can be shown."""
-        if isinstance(error, HandeyeError):
-            message = printable(error.message, MAX_MESSAGE)
-            if isinstance(error, DeviceError):
-                hint = None if error.hint is None else printable(error.hint, MAX_MESSAGE)
-                return DeviceError(message, code=printable(error.code, 60), hint=hint)
-        else:
-            message = printable(f"{type(error).__name__}: {str(error)[:MAX_MESSAGE]}", MAX_MESSAGE)
-        return DeviceError(f"{self._what}: {message}", code="driver_failed")
+        """Return an error of a driver as one of ours."""
+        described = in_our_words(error)
+        if isinstance(error, DeviceError):
+            return described
+        return DeviceError(f"{self._what}: {described.message}", code="driver_failed", hint=described.hint)
+
+
+def in_our_words(error: BaseException) -> DeviceError:
+    """Return whatever a driver raised as an error of ours: short, and of characters that can be shown."""
+    if not isinstance(error, HandeyeError):
+        return DeviceError(f"{type(error).__name__}: {printable(error, MAX_MESSAGE)}", code="driver_failed")
+    message = printable(error.args[0] if error.args else "", MAX_MESSAGE)
+    hint = None if error.hint is None else printable(error.hint, MAX_MESSAGE)
+    return DeviceError(message, code=printable(error.code, 60), hint=hint)

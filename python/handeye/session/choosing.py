@@ -50,6 +50,14 @@ class ArmChooser:
         What makes a view usable.
     solids
         The shapes of the links; None to judge them by capsules.
+
+    Examples
+    --------
+    >>> from handeye.session.configuration import prepare
+    >>> from handeye.session.settings import Configuration
+    >>> prepared = prepare(Configuration("epson_c4l"))  # makes chooser and cell of a simulated arm
+    >>> prepared.arm.name
+    'epson_c4l'
     """
 
     def __init__(

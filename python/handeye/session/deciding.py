@@ -22,7 +22,13 @@ START_VIEWS = 3
 
 
 class EndReason(StrEnum):
-    """How a run ended."""
+    """How a run ended.
+
+    Examples
+    --------
+    >>> EndReason("accuracy_reached") is EndReason.ACCURACY_REACHED
+    True
+    """
 
     ACCURACY_REACHED = "accuracy_reached"
     VIEWS_TAKEN = "views_taken"
@@ -128,6 +134,11 @@ class Situation(Attempts):
         Those of them to plan from: views that turned out wrong are left out.
     estimate
         What is believed; None after fewer than three views.
+
+    Examples
+    --------
+    >>> Situation((), (), measurements, None).missed
+    []
     """
 
     views: tuple[View, ...]
@@ -158,6 +169,12 @@ class Step:
     """What to do next, how it was decided, from what, and how many seconds that took.
 
     `believed` is what is believed of several cameras; `estimate` of one.
+
+    Examples
+    --------
+    >>> from handeye.robots.protocol import Goal
+    >>> Step(Goal("view_01.1", recording.views[0].T_base_flange), "hand", {}, None).goal.label
+    'view_01.1'
     """
 
     goal: Goal
@@ -171,14 +188,30 @@ class Step:
 
 @dataclass(frozen=True)
 class Halt:
-    """That nothing is to be done next, and why."""
+    """That nothing is to be done next, and why.
+
+    Examples
+    --------
+    >>> Halt(EndReason.NO_CANDIDATE, "no posture left").reason.value
+    'no_candidate'
+    """
 
     reason: EndReason
     sentence: str
 
 
 class Chooser(Protocol):
-    """Decides what to do next; the same situation always leads to the same decision."""
+    """Decides what to do next; the same situation always leads to the same decision.
+
+    Examples
+    --------
+    >>> class Stopping:
+    ...     kinematics = None
+    ...     def choose(self, situation):
+    ...         return Halt(EndReason.BY_HAND, "enough")
+    >>> Stopping().choose(None).sentence
+    'enough'
+    """
 
     @property
     def kinematics(self) -> Kinematics | None:

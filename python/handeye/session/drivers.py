@@ -15,7 +15,7 @@ from handeye.cameras.folder import WatchedFolder
 from handeye.cameras.protocol import Grey, ImageSource
 from handeye.cameras.replay import ReplayCamera
 from handeye.datasets.images import read_image
-from handeye.errors import DeviceError, HandeyeError, InputError, printable
+from handeye.errors import DeviceError, InputError
 from handeye.extension import CAMERAS as CAMERA_GROUP
 from handeye.extension import ROBOTS as ROBOT_GROUP
 from handeye.extension import announced
@@ -25,7 +25,7 @@ from handeye.robots import Arm
 from handeye.robots.manual import ManualRobot
 from handeye.robots.protocol import Robot
 from handeye.robots.replay import ReplayRobot
-from handeye.session.calls import MAX_MESSAGE
+from handeye.session.calls import in_our_words
 from handeye.types import View
 
 REPLAY, MANUAL = "replay", "manual"
@@ -117,16 +117,10 @@ def _announced(group: str, name: str, address: str, own: tuple[str, ...], kind: 
         driver = found[name].load()(address)
     except KeyboardInterrupt:
         raise
-    except HandeyeError as error:
-        kind_of_error = InputError if isinstance(error, InputError) else DeviceError
-        raise kind_of_error(
-            printable(f"driver {name}: {error.message}", MAX_MESSAGE),
-            code=printable(error.code, 60),
-            hint=None if error.hint is None else printable(error.hint, MAX_MESSAGE),
-        ) from error
     except BaseException as error:
-        message = printable(f"{type(error).__name__}: {str(error)[:MAX_MESSAGE]}", MAX_MESSAGE)
-        raise DeviceError(f"driver {name}: {message}", code="driver_failed") from error
+        told = in_our_words(error)
+        kind_of_error = InputError if isinstance(error, InputError) else DeviceError
+        raise kind_of_error(f"driver {name}: {told.message}", code=told.code, hint=told.hint) from error
     if not isinstance(driver, kind):
         raise InputError(f"driver {name}: {type(driver).__name__} lacks a method of {kind.__name__}")
     return driver

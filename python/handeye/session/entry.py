@@ -10,7 +10,13 @@ from handeye.types.plain import Document, read_document, without_none
 
 
 class Failure(StrEnum):
-    """Why an attempt brought no view."""
+    """Why an attempt brought no view.
+
+    Examples
+    --------
+    >>> Failure("stale_image") is Failure.STALE_IMAGE
+    True
+    """
 
     NOT_CONFIRMED = "not_confirmed"
     MOTION_REFUSED = "motion_refused"
@@ -102,6 +108,14 @@ class Entry:
         Name of a view or station that does not count any more; nothing was attempted then.
     station
         What came of it with several cameras; None if nothing.
+
+    Examples
+    --------
+    >>> from handeye.types import Pose
+    >>> failed = {"moved": False, "failure": Failure.NOT_CONFIRMED}
+    >>> entry = Entry(1, "view_01.1", "start", Pose.identity(), (), **failed)
+    >>> Entry.from_dict(entry.to_dict()).failure.value
+    'not_confirmed'
     """
 
     number: int

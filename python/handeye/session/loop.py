@@ -30,6 +30,12 @@ class End:
     """How a run ended: the answer if the views determine one, and how far off it may be.
 
     `lens_px` is within how many pixels the lens is known, where the views taught it; None otherwise.
+
+    Examples
+    --------
+    >>> end = End(EndReason.NO_START, "no view", None, None, views=0, attempts=3)
+    >>> end.calibration is None
+    True
     """
 
     reason: EndReason
@@ -55,6 +61,17 @@ class Session(Stepping[Situation, End]):
         Decides where to go.
     wish
         What is asked for.
+
+    Examples
+    --------
+    >>> from handeye.session.configuration import begin, prepare
+    >>> from handeye.session.settings import Configuration, Simulation
+    >>> points = Simulation(points_only=0.1)
+    >>> quick = Configuration("epson_c4l", accuracy_mm=20, accuracy_deg=2, simulation=points)
+    >>> session, store = begin(prepare(quick), Path("session"))
+    >>> session.run().reason.value
+    'accuracy_reached'
+    >>> store.close()
     """
 
     def __init__(
@@ -87,6 +104,11 @@ class Session(Stepping[Situation, End]):
         return tuple(self._usable())
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the views that count, in the order in which they were taken."""
+        return tuple(view.name for view in self._usable())
+
+    @property
     def rejected(self) -> dict[str, str]:
         """Views whose points are no picture of the target, and why."""
         return dict(self._measurements.rejected)
@@ -114,7 +136,7 @@ class Session(Stepping[Situation, End]):
         OutputError
             The disk does not take it.
         """
-        if name not in {view.name for view in self.views}:
+        if name not in self.names:
             raise InputError(f"view {name[:60]}: no view of this session", code="unknown_view")
         return self._withdraw(name, why)
 

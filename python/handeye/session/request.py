@@ -19,6 +19,11 @@ class Requested(StopRule):
     ------
     InputError
         A radius that is not above zero.
+
+    Examples
+    --------
+    >>> Requested(translation_mm=0.5, rotation_deg=0.05).fewest_views
+    6
     """
 
     translation_mm: float

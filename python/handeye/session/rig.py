@@ -18,6 +18,7 @@ from handeye.session.loop import FEWEST_EXAMINED
 from handeye.session.rig_choosing import RigChooser, RigSituation
 from handeye.session.rig_store import RigStore
 from handeye.session.stepping import Stepping
+from handeye.types import RigRecording
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,16 @@ class RigSession(Stepping[RigSituation, RigEnd]):
         self._kinematics = chooser.kinematics
         self._measured: RigMeasurements | None = None
 
+    @property
+    def recording(self) -> RigRecording:
+        """The stations that count."""
+        return self._store.recording
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the stations that count, in the order in which they were taken."""
+        return tuple(station.name for station in self._store.recording.stations)
+
     def withdraw(self, name: str, why: str) -> Entry:
         """Take a station back: it stays in the journal, and counts no more.
 
@@ -61,7 +72,7 @@ class RigSession(Stepping[RigSituation, RigEnd]):
         OutputError
             The disk does not take it.
         """
-        if name not in {station.name for station in self._store.recording.stations}:
+        if name not in self.names:
             raise InputError(f"station {name[:60]}: no station of this session", code="unknown_view")
         return self._withdraw(name, why)
 

@@ -18,7 +18,7 @@ from handeye.planning.rig import FEWEST_STATIONS, RigRequest, rig_gains
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
-from handeye.session.deciding import Attempts, EndReason, Halt, Step
+from handeye.session.deciding import Attempts, Considered, EndReason, Halt, Step
 from handeye.session.safety import body_of
 from handeye.session.starting import LARGEST_TILT_RAD, Start, largest_tilt_rad, starting_goal
 from handeye.session.wish import Wish
@@ -196,7 +196,8 @@ class RigChooser:
                 for name in believed.fit.measurements.cameras
             },
         }
-        return self._step(situation, joints[best], "plan", decision)
+        step = self._step(situation, joints[best], "plan", decision)
+        return replace(step, considered=Considered(pool, found.gains))
 
     def _without_candidate(self, situation: RigSituation, body: Body) -> Step | Halt:
         """Go back the way the arm came where it stands too near to something; else turn about the start.

@@ -56,6 +56,11 @@ class SimulationOptions:
         What is looked at.
     lens
         One of `LENSES`.
+
+    Examples
+    --------
+    >>> SimulationOptions(seed=3, camera_error=0.0).mounting.value
+    'eye_in_hand'
     """
 
     seed: int = 0
@@ -70,7 +75,15 @@ class SimulationOptions:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedCell:
-    """A cell, where its arm stands first, an empty recording of it, and the truth."""
+    """A cell, where its arm stands first, an empty recording of it, and the truth.
+
+    Examples
+    --------
+    >>> from handeye.robots import open_arm
+    >>> simulated = simulated_cell(open_arm("ur5e"))
+    >>> len(simulated.recording), simulated.truth.X is None
+    (0, False)
+    """
 
     cell: Cell
     start: Start
@@ -86,10 +99,23 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
     The board lies on the table in front of the arm, the camera beside the flange and looking along it; or the
     camera stands over the table and the board is on the flange.
 
+    Parameters
+    ----------
+    arm
+        Its description.
+    options
+        Seed, mounting, errors; those of an arm in good order by default.
+
     Raises
     ------
     SolveError
         The arm reaches no posture with its flange down in front of it.
+
+    Examples
+    --------
+    >>> from handeye.robots import open_arm
+    >>> simulated_cell(open_arm("ur5e"), SimulationOptions(seed=3)).start.posture_known
+    True
     """
     options = options or SimulationOptions()
     random = np.random.default_rng([options.seed, 0])

@@ -39,6 +39,12 @@ class Start:
 
     Where a person moves the arm and does not tell its joints, these are some that reach the pose, and
     `posture_known` says that it need not be these.
+
+    Examples
+    --------
+    >>> view = recording.views[0]
+    >>> Start(view.T_base_flange, view.joints_rad).posture_known
+    True
     """
 
     T_base_flange: Pose

@@ -39,6 +39,19 @@ class Stepping(ABC, Generic[S, E]):
         self._taker = Taker(cell, store)
         self._forgiven_up_to: int | None = None
 
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the views or stations that count, in the order in which they were taken."""
+
+    @abstractmethod
+    def withdraw(self, name: str, why: str) -> Entry:
+        """Take a view or station back: it stays in the journal, and counts no more."""
+
+    @abstractmethod
+    def end(self) -> E:
+        """End here, because somebody says so, with the answer so far."""
+
     @abstractmethod
     def _situation(self) -> S | Halt:
         """Return what is believed now, or why nothing is to be done next."""

@@ -145,6 +145,12 @@ class SessionStore(Store):
     """The session of one camera; `begun_with` is the recording before its first view.
 
     Use `create_session` or `open_session`.
+
+    Examples
+    --------
+    >>> store = create_session(Path("session"), recording, {})
+    >>> len(store.recording), store.close()
+    (0, None)
     """
 
     begun_with: Recording
@@ -230,10 +236,25 @@ class SessionStore(Store):
 def create_session(folder: Path, recording: Recording, settings: Mapping[str, Any]) -> SessionStore:
     """Make the folder of a new session: all of it or nothing.
 
+    Parameters
+    ----------
+    folder
+        A new folder.
+    recording
+        What its views will be written into; its own views are left out.
+    settings
+        Plain values for the program that goes on with it.
+
     Raises
     ------
     OutputError
         The folder is not empty, or the system refuses to write.
+
+    Examples
+    --------
+    >>> store = create_session(Path("session"), recording, {})
+    >>> is_session(store.folder), store.close()
+    (True, None)
     """
     empty = recording.with_views(())
     asked = Settings(settings, replace(empty, truth=None).to_dict())
@@ -265,6 +286,13 @@ def open_session(folder: Path) -> SessionStore:
         No session, one of a newer version, a file that was damaged or edited, or another process works on it.
     OutputError
         The recording lags behind the journal and cannot be written.
+
+    Examples
+    --------
+    >>> create_session(Path("session"), recording, {}).close()
+    >>> store = open_session(Path("session"))
+    >>> store.entries, store.close()
+    ((), None)
     """
     return opened(folder, SessionStore)
 
@@ -290,7 +318,15 @@ def opened(folder: Path, kind: type[S]) -> S:
 
 
 def is_session(folder: Path) -> bool:
-    """Tell whether a folder holds a session."""
+    """Tell whether a folder holds a session.
+
+    Raises nothing.
+
+    Examples
+    --------
+    >>> is_session(folder)
+    False
+    """
     return is_file(folder / SETTINGS_FILE) and is_file(folder / JOURNAL_FILE)
 
 

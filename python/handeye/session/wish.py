@@ -52,6 +52,11 @@ class Wish:
     ------
     InputError
         A value out of its range.
+
+    Examples
+    --------
+    >>> Wish(accuracy_mm=0.2, accuracy_deg=0.02).most_views
+    20
     """
 
     accuracy_mm: float | None = 0.5

@@ -152,11 +152,18 @@ class _Told:
 
 
 def _made_of_stated(told: Sequence[_Told], number: int) -> FloatArray:
-    """(2,) errors that were made over those stated, around a number of views."""
-    near = range(number - _AROUND, number + _AROUND + 1)
-    pairs = [(one.made[n], one.stated[n][:2]) for one in told for n in near if n in one.made]
-    made, stated = np.array(pairs).reshape(-1, 2, 2).swapaxes(0, 1)
-    return np.asarray((made / stated).mean(axis=0), dtype=np.float64)
+    """(2,) mean errors that were made over the mean of those stated, averaged around a number of views.
+
+    The mean of the cells' own ratios would be too large: what is stated is large in cells that are known
+    badly by chance, and in those the ratio is small.
+    """
+    ratios: list[FloatArray] = []
+    for near in range(number - _AROUND, number + _AROUND + 1):
+        pairs = [(one.made[near], one.stated[near][:2]) for one in told if near in one.made]
+        if pairs:
+            made, stated = np.array(pairs).mean(axis=0)
+            ratios.append(made / stated)
+    return np.asarray(np.mean(ratios, axis=0), dtype=np.float64)
 
 
 def _told(job: _Job) -> _Told | None:

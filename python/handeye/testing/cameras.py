@@ -24,6 +24,13 @@ class CameraTests:
         A function that changes what the camera sees; None where that cannot be done.
     cable
         Two functions: one that cuts the connection at once, one that mends it; None where there is none.
+
+    Examples
+    --------
+    >>> class TestMine(CameraTests):  # in a file of tests; pytest runs what it inherits
+    ...     size_px = (1280, 1024)
+    >>> hasattr(TestMine, "test_keeps_the_contract")
+    True
     """
 
     @pytest.fixture

@@ -33,6 +33,12 @@ class MockCell:
         Where the camera sits.
     points_only
         Whether the camera gives points instead of pictures, which is quick; their noise is 0.1 px.
+
+    Examples
+    --------
+    >>> cell = MockCell("ur5e", points_only=True)
+    >>> len(cell.joints_rad), len(cell.goals())
+    (6, 3)
     """
 
     def __init__(

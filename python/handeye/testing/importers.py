@@ -14,6 +14,13 @@ class ImporterTests:
     """Subclass it and give the fixtures `importer` and `layout`, a folder (or file) that it reads.
 
     `options`, what the files leave open, where there is such a thing.
+
+    Examples
+    --------
+    >>> class TestMine(ImporterTests):  # with the fixtures `importer` and `layout`
+    ...     pass
+    >>> hasattr(TestMine, "test_knows_its_own")
+    True
     """
 
     @pytest.fixture

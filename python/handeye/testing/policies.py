@@ -13,7 +13,15 @@ from handeye.types.arrays import FloatArray
 
 
 class PolicyTests:
-    """Subclass it and give the fixture `policy`, an instance of yours."""
+    """Subclass it and give the fixture `policy`, an instance of yours.
+
+    Examples
+    --------
+    >>> class TestMine(PolicyTests):  # with the fixture `policy`
+    ...     pass
+    >>> hasattr(TestMine, "test_has_a_name_of_its_own")
+    True
+    """
 
     situations = 25
     """So many different situations are tried."""

@@ -40,6 +40,13 @@ class RobotTests:
         Two functions: one that cuts the connection at once, one that mends it; None where there is none.
 
     `takes_time` is False for arms that stand at their goal at once.
+
+    Examples
+    --------
+    >>> class TestMine(RobotTests):  # with the fixtures `robot` and `goals`
+    ...     takes_time = False
+    >>> hasattr(TestMine, "test_has_the_methods")
+    True
     """
 
     takes_time = True

@@ -13,6 +13,13 @@ class StopRuleTests:
     """Subclass it and give the fixtures `rule`, one of yours, and `state`, in which it says to stop.
 
     `handeye.testing.MockCell.state()` makes states of any number of views.
+
+    Examples
+    --------
+    >>> class TestMine(StopRuleTests):  # with the fixtures `rule` and `state`
+    ...     pass
+    >>> hasattr(TestMine, "test_stops_with_a_reason")
+    True
     """
 
     def test_stops_with_a_reason(self, rule: StopRule, state: State) -> None:

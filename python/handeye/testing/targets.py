@@ -17,7 +17,15 @@ _CAMERA = Camera("pinhole", (1000.0, 1000.0, 480.0, 384.0), 960, 768)
 
 
 class TargetTests:
-    """Subclass it and give the fixture `target`, a board of your family."""
+    """Subclass it and give the fixture `target`, a board of your family.
+
+    Examples
+    --------
+    >>> class TestMine(TargetTests):  # with the fixture `target`
+    ...     within_px = 0.1
+    >>> hasattr(TestMine, "test_cannot_be_changed")
+    True
+    """
 
     within_px = 0.5
     """So near to where it truly is must each point of a rendered picture be found."""

@@ -141,7 +141,7 @@ class Recording:
                     hint="rename one of them",
                 )
             seen.add(view.name.lower())
-            _check_points(view, self.target)
+            check_points(view, self.target)
             _check_inside(view, self.camera)
 
     def __len__(self) -> int:
@@ -213,7 +213,8 @@ class Recording:
         )
 
 
-def _check_points(view: View, target: Target) -> None:
+def check_points(view: View, target: Target) -> None:
+    """Raise InputError where a view has points that the target has not."""
     largest = int(view.point_ids.max())
     if largest >= target.point_count:
         raise InputError(

@@ -186,8 +186,9 @@ class RigRecording:
 
     Examples
     --------
-    >>> rig = RigRecording.of(recording)  # doctest: +SKIP
-    >>> rig.pair("camera", "target").views == recording.views  # doctest: +SKIP
+    >>> one = RigRecording.of(recording)
+    >>> one.pair("camera", "target").views == recording.views
+    True
     """
 
     name: str

@@ -6,9 +6,10 @@ loopback unless it is told otherwise.
 """
 
 from handeye.ui.dashboard import Dashboard
-from handeye.ui.driving import Pace, drive
+from handeye.ui.driving import More, Pace, drive
 from handeye.ui.hub import Command, Hub
+from handeye.ui.rig_dashboard import RigDashboard
 from handeye.ui.server import Server
 from handeye.ui.still import Still
 
-__all__ = ["Command", "Dashboard", "Hub", "Pace", "Server", "Still", "drive"]
+__all__ = ["Command", "Dashboard", "Hub", "More", "Pace", "RigDashboard", "Server", "Still", "drive"]

@@ -114,7 +114,7 @@ def candidates(shown: Shown) -> dict[str, Any]:
     reasons = sorted(set(considered.reasons))
     return {
         "poses": _many(_moving(shown, poses)),
-        "gains": [None if np.isnan(gain) else round(float(gain), 4) for gain in considered.gains],
+        "gains": [None if gain != gain else gain for gain in np.round(considered.gains, 4).tolist()],  # noqa: PLR0124
         "names": [candidate.name for candidate in pool.candidates],
         "chosen": shown.chosen,
         "ruled_out": _many(_moving(shown, considered.ruled_out)),
@@ -335,10 +335,8 @@ def _measured(shown: Shown) -> Measurements:
 
 def _corrected_pose(shown: Shown, T_base_flange: Pose) -> Pose:
     """Return the corrected pose of the view that was taken there, or the pose itself."""
-    for view, right in zip(shown.views, _put_right(shown), strict=True):
-        if view.T_base_flange == T_base_flange:
-            return right.T_base_flange
-    return T_base_flange
+    there = tuple(view for view in shown.views if view.T_base_flange == T_base_flange)[:1]
+    return _put_right(replace(shown, views=there))[0].T_base_flange if there else T_base_flange
 
 
 def _residuals(

@@ -1,15 +1,32 @@
 """Running a session at the pace of a person at a page."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, TypeVar
 
 from handeye.errors import DeviceError, InputError
 from handeye.robots.protocol import Goal
-from handeye.session import End, Session, SessionStore, Step
+from handeye.session import Step
+from handeye.session.attempt import Cell
 from handeye.session.contract import check_at_rest
-from handeye.session.prepared import Prepared
+from handeye.session.stepping import Stepping
 from handeye.types.plain import Document, read_document
-from handeye.ui.dashboard import Dashboard
 from handeye.ui.hub import Command, Hub
+from handeye.ui.live import LiveDashboard
+
+E = TypeVar("E")
+
+
+class More(Document):
+    """What is asked for once a session has ended."""
+
+    accuracy_mm: float
+    accuracy_deg: float
+    most_views: int
+
+
+# Makes the session again that asks for more.
+Again = Callable[[More], Stepping[Any, E]]
 
 
 class Pace:
@@ -30,8 +47,25 @@ class Pace:
         return not skipped
 
 
-def drive(session: Session, store: SessionStore, prepared: Prepared, dashboard: Dashboard, pace: Pace) -> End:
+def drive(
+    session: Stepping[Any, E],
+    cell: Cell,
+    dashboard: LiveDashboard[Any, Any],
+    pace: Pace,
+    again: Again[E],
+) -> E:
     """Run a session as people ask for it at the page, until it has ended and somebody says so.
+
+    Parameters
+    ----------
+    session, cell
+        The session, of one camera or of several, and its world.
+    dashboard
+        The page, prepared.
+    pace
+        Whether motions wait for a person.
+    again
+        Makes the session again with another accuracy or more views.
 
     Raises
     ------
@@ -40,20 +74,24 @@ def drive(session: Session, store: SessionStore, prepared: Prepared, dashboard: 
     OutputError
         The disk does not take an attempt.
     """
-    hub, cell = dashboard.hub, prepared.cell
-    dashboard.prepare(prepared, store)
+    hub = dashboard.hub
     hub.on_stop(cell.stop)
     check_at_rest(cell)
     try:
         while True:
             step = session.next()
-            dashboard.decided(step, session.views, session.rejected)
+            dashboard.decided(step, session)
             dashboard.waits(waits=pace.waits)
-            command = _awaited(hub, pace, ended=isinstance(step, End))
+            command = _awaited(hub, pace, ended=not isinstance(step, Step))
             if command.action == "finish":
-                return step if isinstance(step, End) else session.end()
+                return session.end() if isinstance(step, Step) else step
             try:
-                session = _obey(command, step, session, store, prepared, dashboard, pace)
+                if command.action == "more":
+                    asked = read_document(command.values, More, "more")
+                    session = again(asked)
+                    dashboard.asked_for(asked.accuracy_mm, asked.accuracy_deg, asked.most_views)
+                else:
+                    _obey(command, step, session, cell, hub, pace)
             except (DeviceError, InputError) as error:
                 hub.say(error.message)
     except BaseException:
@@ -68,68 +106,38 @@ def _awaited(hub: Hub, pace: Pace, *, ended: bool) -> Command:
 
 
 def _obey(
-    command: Command,
-    step: Step | End,
-    session: Session,
-    store: SessionStore,
-    prepared: Prepared,
-    dashboard: Dashboard,
-    pace: Pace,
-) -> Session:
-    """Do what is asked for; return the session to go on with."""
+    command: Command, step: object, session: Stepping[Any, E], cell: Cell, hub: Hub, pace: Pace
+) -> None:
+    """Do what is asked for."""
     action, values = command.action, command.values
     if action == "pause":
         pace.waits = True
     elif action == "withdraw":
-        session.withdraw(_view_name(values, session), "marked as bad by hand")
-    elif action == "more":
-        return _asked_again(values, store, prepared, dashboard)
-    elif isinstance(step, End):
+        session.withdraw(_meant(values, session), "marked as bad by hand")
+    elif not isinstance(step, Step):
         if action != "run_on":
-            dashboard.hub.say("The session has ended: ask for more, or finish.")
+            hub.say("The session has ended: ask for more, or finish.")
     elif action in {"go", "run_on", "skip"}:
         pace.waits = pace.waits and action != "run_on"
         if action == "skip":
             pace.skip()
         session.take(step)
     elif action == "here":
-        session.take(_where_it_stands(step, prepared))
-    return session
+        session.take(_where_it_stands(step, cell))
 
 
-def _where_it_stands(step: Step, prepared: Prepared) -> Step:
+def _where_it_stands(step: Step, cell: Cell) -> Step:
     """Return a step that takes a view without going anywhere."""
-    reading = prepared.cell.read()
+    reading = cell.read()
     goal = replace(step.goal, T_base_flange=reading.T_base_flange, joints_rad=reading.joints_rad)
-    return Step(goal, "hand", {}, step.estimate)
+    return Step(goal, "hand", {}, step.estimate, believed=step.believed)
 
 
-def _view_name(values: dict[str, object], session: Session) -> str:
-    """Return the view that is meant: the one named, or the last."""
+def _meant(values: dict[str, object], session: Stepping[Any, E]) -> str:
+    """Return the view or station that is meant: the one named, or the last."""
     name = values.get("view")
-    if name is None and session.views:
-        return session.views[-1].name
+    if name is None and session.names:
+        return session.names[-1]
     if not isinstance(name, str):
         raise InputError("there is no view to take back", code="unknown_view")
     return name
-
-
-class _More(Document):
-    accuracy_mm: float
-    accuracy_deg: float
-    most_views: int
-
-
-def _asked_again(
-    values: dict[str, object], store: SessionStore, prepared: Prepared, dashboard: Dashboard
-) -> Session:
-    asked = read_document(values, _More, "more")
-    configuration = replace(
-        prepared.configuration,
-        accuracy_mm=asked.accuracy_mm,
-        accuracy_deg=asked.accuracy_deg,
-        most_views=asked.most_views,
-    )
-    session = replace(prepared, configuration=configuration).session(store)
-    dashboard.asked_for(asked.accuracy_mm, asked.accuracy_deg, asked.most_views)
-    return session

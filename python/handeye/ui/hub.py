@@ -1,6 +1,5 @@
 """What all threads share: the documents that pages show, what people asked for, and who drives."""
 
-import json
 import queue
 import secrets
 import threading
@@ -8,6 +7,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
+
+import msgspec
 
 from handeye.errors import HandeyeError, InputError
 
@@ -18,6 +19,9 @@ ABSENT_S = 5.0
 # Pages that may look on at a time.
 MOST_WATCHERS = 32
 _MOST_MESSAGES = 60
+# Seconds between two tellings of a document that takes time to make: a loop that runs on by itself is not
+# slowed by pages that look on, and a person who presses a button waits for nothing.
+PAUSES_S = {"scene": 0.5, "picture": 0.5, "candidates": 2.0, "knowledge": 1.0, "views": 1.0}
 
 
 @dataclass(frozen=True)
@@ -70,16 +74,33 @@ class Hub:
         with self._changed:
             return {name: section.version for name, section in self._sections.items()}
 
-    def wait(self, seen: dict[str, int], seconds: float) -> dict[str, int]:
-        """Return the versions once they differ from those seen, or after so many seconds."""
+    def wait(
+        self, seen: dict[str, int], seconds: float, told: dict[str, float] | None = None
+    ) -> dict[str, int]:
+        """Return the versions once they differ from those seen, or after so many seconds.
+
+        Parameters
+        ----------
+        seen
+            Versions that the caller knows.
+        seconds
+            How long to wait at most.
+        told
+            When the caller was told of each document, filled here; without it every change is told at once,
+            else those of `PAUSES_S` after a pause.
+        """
         deadline = time.monotonic() + seconds
         with self._changed:
             while not self.closed:
-                now = {name: section.version for name, section in self._sections.items()}
-                left = deadline - time.monotonic()
-                if now != seen or left <= 0:
-                    return now
-                self._changed.wait(left)
+                now = time.monotonic()
+                changed = {n: s.version for n, s in self._sections.items() if s.version != seen.get(n)}
+                dues = {n: 0.0 if told is None else told.get(n, -1e9) + PAUSES_S.get(n, 0.0) for n in changed}
+                due = {name: version for name, version in changed.items() if dues[name] <= now}
+                if due or now >= deadline:
+                    if told is not None:
+                        told |= dict.fromkeys(due, now)
+                    return seen | due
+                self._changed.wait(min([deadline, *dues.values()]) - now)
         return seen
 
     def document(self, name: str) -> bytes:
@@ -96,7 +117,7 @@ class Hub:
             raise InputError(f"no document {name[:40]!r}", code="unknown_document")
         if section.built is None:
             body = {"version": section.version, "data": section.build()}
-            section.built = json.dumps(body, allow_nan=False, separators=(",", ":")).encode()
+            section.built = msgspec.json.encode(body)
         return section.built
 
     # Commands

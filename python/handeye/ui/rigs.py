@@ -1,7 +1,7 @@
 """What a page is told of several cameras: each camera and target as if alone, put together."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from handeye.estimation import RigEstimate, RigMeasurements
@@ -28,6 +28,8 @@ class ShownRig:
         The curve of each camera: stations, and the radii in mm and deg that were stated after so many.
     open, sentence
         What the stations leave open, and what explains the misfit.
+    looked
+        Whose picture is the last one; None before the first.
     """
 
     parts: Mapping[tuple[str, str], Shown]
@@ -38,6 +40,7 @@ class ShownRig:
     asked: tuple[float, float] | None = None
     open: tuple[str, ...] = ()
     sentence: str | None = None
+    looked: tuple[str, str] | None = None
 
     def named(self, camera: str, target: str, view: str) -> str:
         """Return how a view is named on the page; with the target where its camera saw several."""
@@ -88,17 +91,31 @@ def shown_rig(
             measured.target,
             arm,
             measured.views,
-            None if estimate is None else estimate.of_pair(camera, target),
             rejected=rejected(camera, target),
         )
-    if estimate is None:
-        return ShownRig(parts, known=known or {}, asked=asked)
+    shown = ShownRig(parts, known=known or {}, asked=asked)
+    return shown if estimate is None else with_belief(shown, estimate)
+
+
+def with_belief(rig: ShownRig, estimate: RigEstimate) -> ShownRig:
+    """Return what a page shows of a rig with what is believed of it now."""
+    measurements = estimate.fit.measurements
+    parts = {
+        names: replace(
+            part,
+            estimate=estimate.of_pair(*names),
+            rejected={**part.rejected, **measurements.pairs[names].rejected},
+        )
+        if names in measurements.pairs
+        else part
+        for names, part in rig.parts.items()
+    }
     cameras = [name for name in measurements.cameras if not estimate.unobservable[name]]
     still_open = tuple(
         f"{name}: {one.sentence}" for name, found in estimate.unobservable.items() for one in found
     )
     within = {name: estimate.of_camera(name).within_95 for name in cameras}
-    return ShownRig(parts, within, known or {}, asked, still_open, estimate.attribution.sentence)
+    return replace(rig, parts=parts, within=within, open=still_open, sentence=estimate.attribution.sentence)
 
 
 def scene(rig: ShownRig) -> dict[str, Any]:
@@ -121,7 +138,7 @@ def scene(rig: ShownRig) -> dict[str, Any]:
 
 
 def candidates(rig: ShownRig) -> dict[str, Any]:
-    """Return no candidates: those of a rig are not kept."""
+    """Return where the flange, with what is on it, could go next."""
     return documents.candidates(next(iter(rig.parts.values())))
 
 
@@ -149,19 +166,27 @@ def views(rig: ShownRig) -> dict[str, Any]:
     coverage: dict[str, dict[str, Any]] = {}
     for (camera, target), part in rig.parts.items():
         one = documents.views(part)
-        rows += [row | {"name": rig.named(camera, target, row["name"])} for row in one["views"]]
+        rows += [
+            row | {"name": rig.named(camera, target, row["name"]), "station": row["name"]}
+            for row in one["views"]
+        ]
         rejected += [row | {"name": rig.named(camera, target, row["name"])} for row in one["rejected"]]
         cells = one["coverage"][0]["cells"]
         if camera in coverage:
             before = coverage[camera]["cells"]
             cells = [[a + b for a, b in zip(x, y, strict=True)] for x, y in zip(before, cells, strict=True)]
         coverage[camera] = {"name": camera, "cells": cells}
+    order = list(dict.fromkeys(sorted(row["station"] for row in rows)))
+    rows.sort(key=lambda row: order.index(row["station"]))
     return {"views": rows, "rejected": rejected, "coverage": list(coverage.values())}
 
 
-def picture(rig: ShownRig) -> None:
-    """Return no last picture: each view has its own."""
-    del rig
+def picture(rig: ShownRig) -> dict[str, Any] | None:
+    """Return what is drawn over the last picture of all cameras, None without one."""
+    if rig.looked is None:
+        return None
+    drawn = documents.picture(rig.parts[rig.looked])
+    return None if drawn is None else drawn | {"label": rig.named(*rig.looked, drawn["label"])}
 
 
 def picture_of_view(rig: ShownRig, name: str) -> dict[str, Any] | None:

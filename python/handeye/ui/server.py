@@ -277,8 +277,9 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header("Cache-Control", "no-store")
             self.end_headers()
             seen: dict[str, int] = {}
+            told: dict[str, float] = {}
             while not hub.closed:
-                seen = hub.wait(seen, _BEAT_S)
+                seen = hub.wait(seen, _BEAT_S, told)
                 self.wfile.write(b"data: " + json.dumps(seen).encode() + b"\n\n")
                 self.wfile.flush()
         except OSError:

@@ -7,10 +7,10 @@ from typing import Any
 from handeye.robots import Arm
 from handeye.types.calibration import ModelName
 from handeye.ui import documents, rigs
-from handeye.ui.dashboard import picture_in
 from handeye.ui.documents import Shown
 from handeye.ui.hub import Hub
 from handeye.ui.links import links_of
+from handeye.ui.live import picture_in
 from handeye.ui.rigs import ShownRig
 
 
@@ -72,6 +72,7 @@ class Still:
         count = shown.stations if several else len(shown.views)
         return {
             "kind": "still",
+            "unit": "station" if several else "view",
             "title": self._title,
             "state": "shown",
             "pace": "ask",

@@ -75,6 +75,13 @@ def read_cameras(path: str | os.PathLike[str]) -> dict[str, Camera]:
     ------
     InputError
         As for `read_camera`.
+
+    Examples
+    --------
+    >>> import json
+    >>> _ = Path("camera.json").write_text(json.dumps(camera.to_dict()))
+    >>> list(read_cameras("camera.json"))
+    ['camera']
     """
     file = Path(path)
     with located(str(file)):

@@ -33,6 +33,11 @@ def make_policy(name: str) -> Policy:
     ------
     InputError
         No such policy, or what is announced cannot be loaded or is none.
+
+    Examples
+    --------
+    >>> make_policy("max_distance").name
+    'max_distance'
     """
     policy = POLICIES.get(name)
     if policy is not None:

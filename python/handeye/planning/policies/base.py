@@ -51,7 +51,13 @@ class Choice:
 
 
 class Policy(ABC):
-    """Chooses one of the feasible candidates."""
+    """Chooses one of the feasible candidates.
+
+    Examples
+    --------
+    >>> isinstance(make_policy("next_best_view"), Policy)
+    True
+    """
 
     name: ClassVar[str]
 

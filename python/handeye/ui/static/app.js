@@ -4,7 +4,8 @@ import { charts } from "./charts.js";
 import { panels } from "./panels.js";
 
 const page = sessionStorage.page ??= crypto.getRandomValues(new Uint32Array(4)).reduce((s, n) => s + n.toString(16).padStart(8, "0"), "");
-const seen = {}, fetching = {}, data = {};
+let seen = {};
+const fetching = {}, data = {};
 const $ = (id) => document.getElementById(id);
 
 export async function send(action, values = {}) {
@@ -61,8 +62,9 @@ function listen() {
   stream.onmessage = (event) => {
     $("gone").hidden = true;
     for (const [name, version] of Object.entries(JSON.parse(event.data)))
-      if (version !== seen[name]) update(name, version);
+      if (version > (seen[name] ?? 0)) update(name, version);
   };
+  stream.onopen = () => { seen = {}; }; // perhaps another program by now
   stream.onerror = () => {
     $("gone").hidden = false;
     if (stream.readyState === EventSource.CLOSED) setTimeout(listen, 1500);

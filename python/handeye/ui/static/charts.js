@@ -16,12 +16,13 @@ function curve(curves, key, asked, title, unit) {
   const x = (n) => L + (W - L - R) * (n - first) / (last - first), y = (v) => T + (H - T - B) * (high - Math.log10(v)) / (high - low || 1);
   let inner = `<text x="${L}" y="12">${title}, ${unit}</text>`;
   for (const v of ticks(10 ** low, 10 ** high)) inner += `<line x1="${L}" x2="${W - R}" y1="${y(v)}" y2="${y(v)}" stroke="#e0e6eb"/><text x="${L - 5}" y="${y(v) + 4}" text-anchor="end">${v}</text>`;
-  if (asked) inner += `<line x1="${L}" x2="${W - R}" y1="${y(asked)}" y2="${y(asked)}" stroke="#1a6f3c" stroke-dasharray="5 4" stroke-width="1.5"/><text x="${L + 4}" y="${y(asked) - 4}" fill="#1a6f3c">asked ${figures(asked)}</text>`;
+  if (asked) inner += `<line x1="${L}" x2="${W - R}" y1="${y(asked)}" y2="${y(asked)}" stroke="#1a6f3c" stroke-dasharray="5 4" stroke-width="1.5"/>`;
   drawn.forEach((c, i) => {
     const ink = COLOURS[i % COLOURS.length];
     inner += `<polyline fill="none" stroke="${ink}" stroke-width="2"${c.name === "planned" ? ' stroke-dasharray="4 3"' : ""} points="${c.points.map((p) => `${x(p.views)},${y(p[key])}`).join(" ")}"/>`;
     for (const p of c.points) inner += `<circle cx="${x(p.views)}" cy="${y(p[key])}" r="3" fill="${ink}"/>`;
   });
+  if (asked) inner += `<text x="${L + 4}" y="${y(asked) - 4}" fill="#1a6f3c">asked ${figures(asked)}</text>`;
   const every = Math.ceil((last - first) / 8);
   for (let n = first; n <= last; n += every) inner += `<text x="${x(n)}" y="${H - 8}" text-anchor="middle">${n}</text>`;
   const told = drawn.map((c) => `${c.name ? `${c.name}: ` : ""}${c.points.map((p) => `${p.views}: ${figures(p[key])}`).join(", ")}`);

@@ -5,17 +5,17 @@ import { send } from "./app.js";
 const $ = (id) => document.getElementById(id);
 const figures = (v) => Number(v.toPrecision(2)).toString();
 const element = (tag, values = {}, ...children) => { const e = Object.assign(document.createElement(tag), values); e.append(...children); return e; };
-const PHASES = { start: "a small turn about where the arm stands", plan: "the view that teaches most", nudge: "half way back to where the target was seen", back: "back the way it came", retry: "the same place again", hand: "where the arm stands" };
+const PHASES = { start: "a small turn about where the arm stands", plan: "the place that teaches most", nudge: "half way back to where the target was seen", back: "back the way it came", retry: "the same place again", hand: "where the arm stands" };
 let live = null, picked = null, tell = () => {}, drawn = 0;
 
 function state(d) {
-  if (d.kind === "still") return d.cameras > 1 ? `${d.cameras} cameras, ${d.views} stations.` : `${d.views} views, model ${d.model}.`;
+  if (d.kind === "still") return d.unit === "station" ? `${d.cameras} cameras, ${d.views} stations.` : `${d.views} views, model ${d.model}.`;
   if (d.end) return `Ended: ${d.end.sentence}.`;
   const next = d.label ? `${d.label}: ${PHASES[d.phase] ?? d.phase}${typeof d.gain === "number" ? `, predicted gain ${figures(d.gain)} nats` : ""}` : "";
   if (d.state === "waiting") return `Next is ${next}. Waiting for you.`;
   if (d.state === "moving") return `The arm moves to ${next}.`;
   if (d.state === "preparing") return "Getting ready.";
-  return `Deciding what to do next. ${d.views} views so far.`;
+  return `Deciding what to do next. ${d.views} ${d.unit}s so far.`;
 }
 
 function paint(d, source) {
@@ -77,10 +77,16 @@ export const panels = {
     if (!d.drives) { $("buttons").hidden = $("take-over").hidden = $("people").hidden = true; return; }
     const waiting = d.state === "waiting", ended = Boolean(d.end);
     const may = { go: waiting, run_on: waiting, skip: waiting, here: waiting, withdraw: (waiting || ended) && d.views > 0, finish: waiting || ended, pause: !waiting && !ended && d.pace === "on" };
+    document.querySelector("[data-action=go]").textContent = `Take ${d.unit}`;
+    document.querySelector("[data-action=withdraw]").textContent = `Undo last ${d.unit}`;
+    $("more-what").textContent = `${d.unit}s`;
     for (const b of document.querySelectorAll("[data-action]")) if (b.dataset.action !== "stop") b.disabled = !drives || !may[b.dataset.action];
     $("upload").hidden = !(d.uploads && drives && d.state === "moving");
     const show = ended && drives;
-    if (show && $("more").hidden) $("more-views").value = d.most_views + 10;
+    if (show && $("more").hidden) {
+      $("more-views").value = d.most_views + 10;
+      [$("more-mm").value, $("more-deg").value] = d.asked ?? ["", ""];
+    }
     $("more").hidden = !show;
   },
 
@@ -94,15 +100,19 @@ export const panels = {
   },
 
   views(d, drives, status) {
+    let before = null;
     $("views").replaceChildren(...d.views.map((v) => {
       const show = element("button", { className: "link", textContent: v.name, type: "button" });
       show.addEventListener("click", () => this.pick(v.name));
       const bad = element("button", { textContent: "Mark as bad", type: "button", disabled: !status?.drives });
-      bad.setAttribute("aria-label", `Mark ${v.name} as bad`);
-      bad.addEventListener("click", () => send("withdraw", { view: v.name }));
-      return element("tr", {}, element("td", {}, show), element("td", { textContent: v.points }), element("td", { textContent: v.rmse_px === null ? "" : v.rmse_px.toFixed(3) }), element("td", {}, status?.drives ? bad : ""));
+      const whole = v.station ?? v.name, offered = status?.drives && whole !== before; // a station goes as a whole
+      before = whole;
+      bad.setAttribute("aria-label", `Mark ${whole} as bad`);
+      bad.addEventListener("click", () => send("withdraw", { view: whole }));
+      return element("tr", {}, element("td", {}, show), element("td", { textContent: v.points }), element("td", { textContent: v.rmse_px === null ? "" : v.rmse_px.toFixed(3) }), element("td", {}, offered ? bad : ""));
     }));
     $("rejected").replaceChildren(...d.rejected.map((r) => element("li", { textContent: `${r.name}: ${r.why}` })));
+    $("coverage").className = d.coverage.length > 1 ? "several" : "";
     $("coverage").innerHTML = d.views.length ? d.coverage.map(coverage).join("") : "";
     if (picked) this.pick(picked);
   },
