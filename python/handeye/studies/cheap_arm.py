@@ -175,7 +175,7 @@ def _mounted(random: np.random.Generator, mounting: Mounting) -> tuple[Pose, Pos
 def made_cell(random: np.random.Generator, mounting: Mounting, count: int) -> tuple[Measurements, Pose]:
     """Draw a cell: its views, postures one after the other with the board whole in the picture, and X.
 
-    One whose arm cannot show its board is drawn anew.
+    One whose arm cannot show its board is drawn again.
 
     Raises
     ------
