@@ -80,7 +80,10 @@ def main() -> None:
     pip = [str(venv / "bin" / "python"), "-m", "pip", "install", "--quiet"]
     subprocess.run([*pip, *PACKAGES.split()], check=True)
     subprocess.run([*pip, "--requirement", str(repository / "requirements" / "dev.txt")], check=True)
-    subprocess.run([*pip, "--no-deps", "--no-build-isolation", "--editable", str(repository)], check=True)
+    # maturin, which builds the extension, is found by its name.
+    found = os.environ | {"PATH": f"{venv / 'bin'}{os.pathsep}{os.environ['PATH']}"}
+    editable = [*pip, "--no-deps", "--no-build-isolation", "--editable", str(repository)]
+    subprocess.run(editable, check=True, env=found)
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     packages = venv / "lib" / version / "site-packages"
     headers = {

@@ -8,7 +8,8 @@ pixel noise of 0.05 to 0.2 px, robot noise of 0 to 0.2 mm and 0.02 deg, each set
 size       a camera file of another size                           must be refused
 pinhole    a lens of mild distortion given as one without any      a region that holds the truth
 decimals   rotations and positions rounded to 4 decimals           a region that holds the truth
-dots       a camera_info file whose numbers end in dots            a region that holds the truth
+camera     a file of ROS, Kalibr, RealSense, OpenCV; dotted numbers  a region that holds the truth
+mixture    a camera beside an arm with ordinary errors of all sorts  a region that holds the truth
 signs      Euler angles with signs turned                          refused, or a region that holds the truth
 readings   poses read in a convention of another robot             the same
 mirrored   pictures flipped                                        the same
@@ -16,16 +17,18 @@ inverse    base in flange                                          the same
 gimbal     a pan-tilt unit, base in flange                         the same
 stale      the pose of the view before, in pairs or throughout     the same
 
-Right is what the list says. A region holds the truth if the camera's centre is off by no more than the stated
-95 % radius; where an answer is due, one in twenty may miss it. Wrong is an answer beyond that radius and
-beyond 3 mm.
+Folders with a file of poses are those of tools/measure_notations.py. Right is what the list says. A region
+holds the truth if the camera's centre is off by no more than the stated 95 % radius; where an answer is due,
+one in twenty may miss it. Wrong is an answer beyond that radius and beyond 3 mm.
 """
 
 import argparse
+import json
 import sys
 import tempfile
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
@@ -37,12 +40,13 @@ from handeye.estimation import solve
 from handeye.estimation.confidence import within
 from handeye.importing import SourceOptions, open_folder
 from handeye.notations import NOTATIONS
+from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording, Truth, View
 
 BOARDS = (Chessboard(6, 9, 0.025), Chessboard(7, 9, 0.03), Chessboard(8, 11, 0.02))
 LENS = [1200.0, 1200.0, 639.5, 511.5, -0.1, 0.05, 5e-4, -5e-4, 0.0]
 WRONG_M = 3e-3
-DUE = frozenset({"pinhole", "decimals", "dots"})
+DUE = frozenset({"pinhole", "decimals", "camera", "mixture"})
 READINGS = (
     ("kuka", "euler_xyz_fixed_deg"), ("ur", "euler_xyz_fixed_rad"), ("doosan", "kuka"), ("kuka", "doosan"),
     ("fanuc", "kuka"), ("staubli", "fanuc"), ("quaternion_xyzw", "quaternion_wxyz"),
@@ -53,6 +57,9 @@ READINGS = (
 def cell_of(number: int, seed: int, kind: str) -> tuple[Recording, np.random.Generator]:
     """The right recording of a number, with its truth."""
     random = np.random.default_rng([seed, number, sum(map(ord, kind))])
+    if kind == "mixture":
+        options = CellOptions(mounting=Mounting.EYE_TO_HAND, target=BOARDS[number % 3], views=(6, 14))
+        return simulate(ErrorKind.MIXTURE_CELL, number, options, seed=seed), random
     mounting = (Mounting.EYE_IN_HAND, Mounting.EYE_TO_HAND)[number % 2]
     camera = Camera("brown_conrady_5", LENS, 1280, 1024)
     if kind == "pinhole":
@@ -105,7 +112,7 @@ def posed(recording: Recording, poses: list[Pose], camera: Camera | None = None)
 
 
 def spoilt(
-    kind: str, recording: Recording, random: np.random.Generator, folder: Path
+    kind: str, number: int, recording: Recording, random: np.random.Generator, folder: Path
 ) -> tuple[Recording, Camera | None]:
     """The recording as someone has got it wrong, and a camera to give with it."""
     poses = [view.T_base_flange for view in recording.views]
@@ -114,8 +121,10 @@ def spoilt(
         return recording, Camera("brown_conrady_5", LENS, width + 1, height)
     if kind == "pinhole":
         return posed(recording, poses, Camera("pinhole", LENS[:4], 1280, 1024)), None
-    if kind == "dots":
-        return recording, read_camera(camera_info(folder, recording.camera))
+    if kind == "camera":
+        return recording, read_camera(camera_file(folder, recording.camera, number))
+    if kind == "mixture":
+        return recording, None
     return posed(recording, changed(kind, poses, random)) if kind != "mirrored" else flipped(
         recording, random
     ), None
@@ -154,17 +163,35 @@ def flipped(recording: Recording, random: np.random.Generator) -> Recording:
     return Recording(r.name, r.mounting, r.camera, r.target, tuple(map(mirrored, r.views)), r.truth, r.source)
 
 
-def camera_info(folder: Path, camera: Camera) -> Path:
-    """A file as camera_calibration_parsers writes it, with numbers as NumPy prints them."""
+def camera_file(folder: Path, camera: Camera, number: int) -> Path:
+    """The camera in a file of one of the formats: each in turn, numbers as NumPy prints them."""
     fx, fy, cx, cy, *distortion = (f"{v:.6f}".rstrip("0") for v in camera.parameters)
-    path = folder / "camera.yaml"
-    path.write_text(
-        f"image_width: {camera.width_px}\nimage_height: {camera.height_px}\n"
-        "camera_matrix:\n  rows: 3\n  cols: 3\n"
-        f"  data: [{fx}, 0., {cx}, 0., {fy}, {cy}, 0., 0., 1.]\ndistortion_model: plumb_bob\n"
-        f"distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [{', '.join(distortion)}]\n"
-    )
-    return path
+    k, d = f"[{fx}, 0., {cx}, 0., {fy}, {cy}, 0., 0., 1.]", f"[{', '.join(distortion)}]"
+    width, height = camera.size_px
+    texts = {
+        "parsers.yaml": f"image_width: {width}\nimage_height: {height}\n"
+        f"camera_matrix: {{rows: 3, cols: 3, data: {k}}}\n"
+        f"distortion_model: plumb_bob\ndistortion_coefficients: {{rows: 1, cols: 5, data: {d}}}\n",
+        "ros1.yaml": f"height: {height}\nwidth: {width}\ndistortion_model: plumb_bob\nD: {d}\nK: {k}\n---\n",
+        "ros2.yaml": f"height: {height}\nwidth: {width}\ndistortion_model: plumb_bob\nd: {d}\nk: {k}\n---\n",
+        "kalibr.yaml": "cam0:\n  camera_model: pinhole\n  distortion_model: radtan\n"
+        f"  distortion_coeffs: [{', '.join(distortion[:4])}]\n  intrinsics: [{fx}, {fy}, {cx}, {cy}]\n"
+        f"  resolution: [{width}, {height}]\n",
+        "realsense.json": json.dumps(
+            {"width": width, "height": height, "model": "brown_conrady", "fx": float(fx), "fy": float(fy)}
+            | {"ppx": float(cx), "ppy": float(cy), "coeffs": [float(v) for v in distortion]}
+        ),
+    }
+    name = [*texts, "storage.yml"][number % (len(texts) + 1)]
+    if name in texts:
+        (folder / name).write_text(texts[name])
+        return folder / name
+    storage = cv2.FileStorage(str(folder / name), cv2.FILE_STORAGE_WRITE)
+    for key, value in (("image_width", width), ("image_height", height), ("camera_matrix", camera.matrix)):
+        storage.write(key, value)
+    storage.write("distortion_coefficients", np.array([[float(v) for v in distortion]]))
+    storage.release()
+    return folder / name
 
 
 def outcome(kind: str, number: int, seed: int) -> tuple[str, str]:
@@ -173,7 +200,7 @@ def outcome(kind: str, number: int, seed: int) -> tuple[str, str]:
     truth = recording.truth
     assert truth is not None
     with tempfile.TemporaryDirectory() as parent:
-        given, camera = spoilt(kind, recording, random, Path(parent))
+        given, camera = spoilt(kind, number, recording, random, Path(parent))
         folder = Path(parent) / "set"
         write_recording(given, folder)
         try:
@@ -188,7 +215,19 @@ def outcome(kind: str, number: int, seed: int) -> tuple[str, str]:
     return ("wrong" if off > WRONG_M else "misses"), f"{1e3 * off:.3g} mm off, stated {1e3 * radius:.3g} mm"
 
 
-KINDS = ("size", "pinhole", "decimals", "dots", "signs", "readings", "mirrored", "inverse", "gimbal", "stale")
+KINDS = (
+    "size",
+    "pinhole",
+    "decimals",
+    "camera",
+    "mixture",
+    "signs",
+    "readings",
+    "mirrored",
+    "inverse",
+    "gimbal",
+    "stale",
+)
 
 
 def main() -> None:
@@ -198,15 +237,17 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
+    print(f"{'kind':10}{'right':>8}{'refused':>9}{'misses':>8}{'wrong':>7}   of {arguments.count}")
     for kind in arguments.kind or KINDS:
         results = [outcome(kind, number, arguments.seed) for number in range(arguments.count)]
         for number, (result, said) in enumerate(results):
             if result == "wrong" or (result == "refused" and kind in DUE):
                 print(f"  {kind} {number} {result}: {said}")
-        counts = {
-            name: sum(r == name for r, _ in results) for name in ("refused", "holds", "misses", "wrong")
-        }
-        print(f"{kind}: " + ", ".join(f"{count} {name}" for name, count in counts.items()), flush=True)
+        right = sum(result == "holds" or (result == "refused" and kind not in DUE) for result, _ in results)
+        refused, misses, wrong = (
+            sum(r == name for r, _ in results) for name in ("refused", "misses", "wrong")
+        )
+        print(f"{kind:10}{right:8}{refused:9}{misses:8}{wrong:7}", flush=True)
 
 
 if __name__ == "__main__":

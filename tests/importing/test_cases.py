@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from handeye.datasets import Statement, read_camera
+from commands import Handeye
+from handeye.datasets import Statement, load, read_camera
+from handeye.datasets.images import read_image
 from handeye.errors import InputError, UnstatedError
 from handeye.estimation import solve
 from handeye.estimation.confidence import within
@@ -125,3 +127,43 @@ def test_eye_to_hand_mix() -> None:
     off = calibration.results["T_base_camera"].translation - truth.translation
     known = within(calibration.covariance, calibration.degrees_of_freedom)
     assert 1e3 * float((off**2).sum() ** 0.5) < known.translation_mm
+
+
+def test_a_version_of_thousands_of_digits_is_refused_in_words() -> None:
+    with pytest.raises(InputError, match=r"recording\.toml"):
+        open_folder(CASES / "hostile" / "hex-version")
+
+
+def test_sixteen_thousand_digits_of_a_square_size_are_refused(tmp_path: Path) -> None:
+    views = CASES / "camera_of_another_size" / "views"
+    shutil.copytree(views, tmp_path / "views", copy_function=shutil.copyfile)
+    (tmp_path / "views").chmod(0o755)
+    (tmp_path / "views" / "squaresize.txt").unlink()
+    shutil.copyfile(CASES / "hostile" / "squaresize.txt", tmp_path / "views" / "squaresize.txt")
+    with pytest.raises(InputError, match=r"squaresize\.txt"):
+        load(tmp_path / "views", pattern=(6, 9))
+
+
+@pytest.mark.parametrize("name", ["claim.jpg", "scans.jpg"])
+def test_pictures_that_cost_more_than_they_show_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match=name) as caught:
+        read_image(CASES / "hostile" / name)
+    assert caught.value.code == "too_large"
+
+
+def test_markup_in_names_is_printed_as_it_is(tmp_path: Path, handeye: Handeye) -> None:
+    recording = CASES / "eye_to_hand_mix"
+    done = handeye("plan", recording, "--candidates", CASES / "hostile" / "plan-markup.csv")
+    assert done.code in {0, 4}, done.err
+    assert "[/b]" in done.out + done.err
+
+
+# What other tests hold: boards and corners, the loop, and the camera of the same pictures.
+ELSEWHERE = {"charuco_boards", "narrow_margin", "same_pictures"}
+
+
+def test_every_case_has_its_test() -> None:
+    text = Path(__file__).read_text(encoding="utf-8")
+    given = {entry.name for entry in CASES.iterdir() if entry.is_dir()}
+    assert given
+    assert not [name for name in given - ELSEWHERE if f'"{name}' not in text]

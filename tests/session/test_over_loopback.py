@@ -2,66 +2,35 @@
 
 import threading
 import time
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from handeye.cameras.protocol import Frame
-from handeye.errors import DeviceError
 from handeye.session import configuration as sessions
 from handeye.session.attempt import Timeouts
-from handeye.session.deciding import EndReason
+from handeye.session.deciding import FAILED, EndReason
 from handeye.session.entry import Failure
 from handeye.session.loop import End
 from handeye.session.settings import Configuration
 from handeye.testing import MockCell
-from handeye.testing.universal_robots import MockUniversalRobot
+from partners import CAMERAS, NEVER, ROBOTS, Eye, Partner
 
+SEED = 11
 SPACE = ((-1.1, -1.1, 0.02), (1.1, 1.1, 1.3))
 
 
-class Camera:
-    """The camera of the cell, with a cable of its own."""
-
-    def __init__(self, cell: MockCell) -> None:
-        self.cell = cell
-        self.connected = True
-        self.grabs = 0
-
-    def grab(self, label: str) -> Frame:
-        self.grabs += 1
-        if not self.connected:
-            raise DeviceError("no camera", code="connection_lost")
-        return self.cell.grab(label)
-
-
-@pytest.fixture
-def controller() -> Iterator[MockUniversalRobot]:
-    made = MockUniversalRobot(MockCell("ur5e", seed=11, points_only=True), pace=4.0)
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def camera(controller: MockUniversalRobot, monkeypatch: pytest.MonkeyPatch) -> Camera:
-    made = Camera(controller.cell)
-    monkeypatch.setattr(sessions, "open_camera", lambda *_: made)
-    return made
-
-
-def asked(controller: MockUniversalRobot, **changes: object) -> Configuration:
-    usual = Configuration(
+def asked(partner: Partner) -> Configuration:
+    return Configuration(
         "ur5e",
-        driver=f"ur:{controller.address}",
+        driver=partner.driver,
         images="mock",
         workspace_m=SPACE,
         speed_rad_s=3.0,
         timeouts=Timeouts(move_s=20, read_s=5, grab_s=5),
+        failures_in_a_row=2,
     )
-    return replace(usual, **changes)  # type: ignore[arg-type]
 
 
 def driven(configuration: Configuration, cell: MockCell, folder: Path) -> tuple[End, list[Failure | None]]:
@@ -84,41 +53,68 @@ def true_errors(end: End, cell: MockCell) -> tuple[float, float]:
     return 1e3 * float(np.linalg.norm(off[:3])), float(np.rad2deg(np.linalg.norm(off[3:])))
 
 
-def test_a_calibration_survives_that_cables_are_pulled(
-    controller: MockUniversalRobot, camera: Camera, tmp_path: Path
-) -> None:
-    """The robot's in mid-motion, for a while; then the camera's, until somebody resumes."""
-    cell, stop = controller.cell, threading.Event()
-    stood: list[tuple[float, ...]] = []
-
-    def sabotage() -> None:
-        while not stop.is_set() and (camera.grabs < 2 or not controller._rate.any()):
-            time.sleep(0.002)
-        controller.cut()
-        time.sleep(1.0)  # the controller has stopped the arm by itself
-        stood.extend([tuple(controller._rate), cell.joints_rad, tuple(controller._q)])
-        time.sleep(1.0)
-        controller.mend()
-        while not stop.is_set() and camera.grabs < 5:
-            time.sleep(0.002)
-        camera.connected = False
-
-    wish = asked(controller, failures_in_a_row=2)
-    thread = threading.Thread(target=sabotage)
+def interrupted(
+    partner: Partner, eye: Eye, folder: Path, sabotage: Callable[[threading.Event], None]
+) -> tuple[End, list[Failure | None]]:
+    """Run a calibration while somebody pulls cables; it says so, and once resumed ends at the truth."""
+    wish, over = asked(partner), threading.Event()
+    thread = threading.Thread(target=sabotage, args=(over,))
     thread.start()
     try:
-        end, failures = driven(wish, cell, tmp_path / "s")
+        end, failures = driven(wish, partner.cell, folder)
     finally:
-        stop.set()
+        over.set()
         thread.join()
-    assert not np.any(stood[0])
-    assert stood[1] == pytest.approx(stood[2])
-    assert Failure.ROBOT_FAILED in failures
-    assert failures[-2:] == [Failure.CAMERA_FAILED, Failure.CAMERA_FAILED]
-    assert end.reason is EndReason.TOO_MANY_FAILURES
-    camera.connected = True
-    end, _ = driven(wish, cell, tmp_path / "s")
-    assert end.reason is EndReason.ACCURACY_REACHED
-    translation_mm, rotation_deg = true_errors(end, cell)
+    eye.cut_at = NEVER
+    partner.mend()
+    eye.mend()
+    resumed = driven(wish, partner.cell, folder)[0] if end.reason in FAILED else end
+    assert resumed.reason is EndReason.ACCURACY_REACHED
+    translation_mm, rotation_deg = true_errors(resumed, partner.cell)
     assert translation_mm < 0.5
     assert rotation_deg < 0.05
+    return end, failures
+
+
+@pytest.mark.parametrize(("name", "back"), [("ur", True), *((name, False) for name in ROBOTS)], ids=str)
+def test_a_robot_that_is_lost_in_mid_motion(
+    name: str, back: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It comes back by itself or not; the arm rests, nothing is repeated, and the session goes on."""
+    partner = ROBOTS[name](SEED)
+    eye = CAMERAS["mock"](partner.cell, tmp_path)
+    monkeypatch.setattr(sessions, "open_camera", lambda *_: eye)
+    stood: list[np.ndarray] = []
+
+    def sabotage(over: threading.Event) -> None:
+        while not over.is_set() and (eye.grabs < 2 or not partner.moves()):
+            time.sleep(0.002)
+        partner.cut()
+        time.sleep(1.0)
+        stood.append(partner.joints().copy())
+        time.sleep(1.0)
+        stood.append(partner.joints().copy())
+        if back:
+            partner.mend()
+
+    end, failures = interrupted(partner, eye, tmp_path / "s", sabotage)
+    partner.close()
+    assert Failure.ROBOT_FAILED in failures
+    assert np.array_equal(*stood), "the arm still moves"
+    if not back:
+        assert end.reason in FAILED
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_a_camera_that_is_lost_in_mid_grab(
+    camera: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """No picture of before is taken for one of now, and the session goes on where it stood."""
+    partner = ROBOTS["ur"](SEED)
+    eye = CAMERAS[camera](partner.cell, tmp_path)
+    monkeypatch.setattr(sessions, "open_camera", lambda *_: eye)
+    eye.cut_at = 4
+    end, failures = interrupted(partner, eye, tmp_path / "s", lambda _: None)
+    partner.close()
+    assert failures[-2:] == [Failure.CAMERA_FAILED, Failure.CAMERA_FAILED]
+    assert end.reason is EndReason.TOO_MANY_FAILURES

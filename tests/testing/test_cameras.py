@@ -8,6 +8,7 @@ import pytest
 from handeye.cameras.protocol import Frame, ImageSource
 from handeye.errors import DeviceError
 from handeye.testing import CameraTests, MockCell
+from rules import rules_of
 
 
 class Steady:
@@ -147,3 +148,7 @@ def test_each_rule_finds_who_breaks_it(driver: type, rule: str, words: str) -> N
     wanted = test.__code__.co_varnames[1 : test.__code__.co_argcount]
     with pytest.raises((AssertionError, DeviceError, pytest.fail.Exception), match=words):
         test(**{name: given[name] for name in wanted})
+
+
+def test_every_rule_is_broken_by_somebody() -> None:
+    assert {rule for _, rule, _ in BROKEN} == rules_of(CameraTests)

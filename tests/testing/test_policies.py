@@ -17,6 +17,7 @@ from handeye.planning.policies import Choice, NextBestView, Situation
 from handeye.planning.stopping import State, StopReason
 from handeye.testing import MockCell, PolicyTests, StopRuleTests
 from handeye.types.arrays import FloatArray
+from rules import rules_of
 
 
 class TestOurs(PolicyTests):
@@ -71,18 +72,18 @@ class WorthWithoutGain(Mine):
         return np.nan_to_num(gains)
 
 
-@pytest.mark.parametrize(
-    ("policy", "rule"),
-    [
-        (TakenName, "test_has_a_name_of_its_own"),
-        (First, "test_takes_a_candidate_that_shows_enough"),
-        (NoScore, "test_takes_a_candidate_that_shows_enough"),
-        (OwnChance, "test_the_same_chance_makes_the_same_choice"),
-        (Scribbles, "test_leaves_the_situation_as_it_is"),
-        (OneWorth, "test_says_what_candidates_are_worth_by_their_gains"),
-        (WorthWithoutGain, "test_says_what_candidates_are_worth_by_their_gains"),
-    ],
-)
+BROKEN = [
+    (TakenName, "test_has_a_name_of_its_own"),
+    (First, "test_takes_a_candidate_that_shows_enough"),
+    (NoScore, "test_takes_a_candidate_that_shows_enough"),
+    (OwnChance, "test_the_same_chance_makes_the_same_choice"),
+    (Scribbles, "test_leaves_the_situation_as_it_is"),
+    (OneWorth, "test_says_what_candidates_are_worth_by_their_gains"),
+    (WorthWithoutGain, "test_says_what_candidates_are_worth_by_their_gains"),
+]
+
+
+@pytest.mark.parametrize(("policy", "rule"), BROKEN)
 def test_each_rule_finds_the_policy_that_breaks_it(policy: type[Policy], rule: str) -> None:
     getattr(PolicyTests(), rule)(Mine())
     with pytest.raises(AssertionError):
@@ -128,15 +129,23 @@ class Greedy(StopRule):
         return Stop(StopReason.VIEWS_TAKEN, "enough", {"best": int(np.nanargmax(state.gains))})
 
 
-@pytest.mark.parametrize(
-    ("rule", "name"),
-    [
-        (Mute(), "test_stops_with_a_reason"),
-        (WithoutEvidence(), "test_stops_with_a_reason"),
-        (Forgetful(), "test_says_the_same_twice"),
-        (Greedy(), "test_survives_candidates_without_a_gain"),
-    ],
-)
+BROKEN_RULES = [
+    (Mute(), "test_stops_with_a_reason"),
+    (WithoutEvidence(), "test_stops_with_a_reason"),
+    (Forgetful(), "test_says_the_same_twice"),
+    (Greedy(), "test_survives_candidates_without_a_gain"),
+]
+
+
+@pytest.mark.parametrize(("rule", "name"), BROKEN_RULES)
 def test_each_rule_finds_the_stop_rule_that_breaks_it(rule: StopRule, name: str, eight: State) -> None:
     with pytest.raises((AssertionError, ValueError)):
         getattr(StopRuleTests(), name)(rule, eight)
+
+
+def test_every_rule_of_policies_is_broken_by_somebody() -> None:
+    assert {rule for _, rule in BROKEN} == rules_of(PolicyTests)
+
+
+def test_every_rule_of_stop_rules_is_broken_by_somebody() -> None:
+    assert {rule for _, rule in BROKEN_RULES} == rules_of(StopRuleTests)

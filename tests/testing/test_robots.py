@@ -13,6 +13,7 @@ from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.session import contract
 from handeye.testing import MockCell, RobotTests
 from handeye.types import Pose
+from rules import rules_of
 
 CELL = MockCell("ur5e", points_only=True)
 GOALS = CELL.goals()
@@ -214,12 +215,77 @@ class NotMended(SlowArm):
             raise
 
 
+class Raw(SlowArm):
+    def read_pose(self) -> Reading:
+        return super().read_pose().T_base_flange  # type: ignore[return-value]
+
+
+class Inverse(SlowArm):
+    def read_pose(self) -> Reading:
+        reading = super().read_pose()
+        return Reading(reading.T_base_flange.inverse(), reading.joints_rad)
+
+
+class OneJointLess(SlowArm):
+    def read_pose(self) -> Reading:
+        reading = super().read_pose()
+        return Reading(reading.T_base_flange, (reading.joints_rad or ())[:-1])
+
+
+class Restless(SlowArm):
+    def read_pose(self) -> Reading:
+        self.joints = self.joints + np.array([0.002, 0, 0, 0, 0, 0])
+        return super().read_pose()
+
+
+class HangsOnStop(SlowArm):
+    """It hears of the stop only once the motion would have ended, and stands where it was stopped."""
+
+    def move_to(self, goal: Goal) -> None:
+        try:
+            super().move_to(goal)
+        except DeviceError as error:
+            if error.code == "stopped":
+                time.sleep(1.0)
+            raise
+
+
+class StopsWithAnyError(SlowArm):
+    def move_to(self, goal: Goal) -> None:
+        try:
+            super().move_to(goal)
+        except DeviceError as error:
+            if error.code == "stopped":
+                raise RuntimeError("stopped") from error
+            raise
+
+
+class MuteOnceStopped(SlowArm):
+    def read_pose(self) -> Reading:
+        if self.halted.is_set():
+            raise DeviceError("no answer")
+        return super().read_pose()
+
+
+class Coasts(SlowArm):
+    """It says that it has stopped, and rolls on."""
+
+    def read_pose(self) -> Reading:
+        if self.halted.is_set():
+            self.joints = self.joints + np.array([0.002, 0, 0, 0, 0, 0])
+        return super().read_pose()
+
+
 BROKEN: list[tuple[type, str, str]] = [
     (NoStop, "test_has_the_methods", "lacks"),
     (Degrees, "test_ends_where_it_was_sent_and_says_so", "degrees"),
     (Millimetres, "test_ends_where_it_was_sent_and_says_so", "millimetres"),
     (Tool, "test_ends_where_it_was_sent_and_says_so", "flange of the description"),
     (TooEarly, "test_ends_where_it_was_sent_and_says_so", "before the arm rests|away"),
+    (Raw, "test_ends_where_it_was_sent_and_says_so", "expected Reading"),
+    (Inverse, "test_ends_where_it_was_sent_and_says_so", "base in the flange"),
+    (OneJointLess, "test_ends_where_it_was_sent_and_says_so", "5 joint positions"),
+    (Restless, "test_ends_where_it_was_sent_and_says_so", "before the arm rests"),
     (GoesAnyway, "test_refuses_what_it_cannot_reach", "must refuse"),
     (RefusesUnnamed, "test_refuses_what_it_cannot_reach", "motion_refused"),
     (MovesAndRefuses, "test_refuses_what_it_cannot_reach", "all the same"),
@@ -228,6 +294,10 @@ BROKEN: list[tuple[type, str, str]] = [
     (DeafToStop, "test_stops_in_mid_motion", "went on to its goal"),
     (StopsSilently, "test_stops_in_mid_motion", "as if the goal had been reached"),
     (NeverAgain, "test_stops_in_mid_motion", "stopped"),
+    (HangsOnStop, "test_stops_in_mid_motion", "came back only"),
+    (StopsWithAnyError, "test_stops_in_mid_motion", "RuntimeError, expected DeviceError"),
+    (MuteOnceStopped, "test_stops_in_mid_motion", "cannot be read afterwards"),
+    (Coasts, "test_stops_in_mid_motion", "still moves"),
     (SilentLoss, "test_says_that_the_connection_is_lost", "expected DeviceError"),
     (GoesOnBlind, "test_says_that_the_connection_is_lost", "without a connection"),
     (NotMended, "test_says_that_the_connection_is_lost", "once the connection is back"),
@@ -251,3 +321,7 @@ def test_each_rule_finds_who_breaks_it(driver: type, rule: str, words: str) -> N
     wanted = test.__code__.co_varnames[1 : test.__code__.co_argcount]
     with pytest.raises(AssertionError, match=words):
         test(**{name: given[name] for name in wanted})
+
+
+def test_every_rule_is_broken_by_somebody() -> None:
+    assert {rule for _, rule, _ in BROKEN} == rules_of(RobotTests)

@@ -14,8 +14,8 @@ import numpy as np
 
 from handeye.errors import InputError
 from handeye.robots.model import Arm, Joint
-from handeye.robots.urdf import LARGEST_ANGLE_RAD, LARGEST_TURN_RAD, LONGEST_OFFSET_M, numbers_of
 from handeye.robots.xml_tree import Element, read_xml
+from handeye.robots.xml_values import LARGEST_ANGLE_RAD, LARGEST_TURN_RAD, LONGEST_OFFSET_M, numbers_of
 from handeye.types.arrays import FloatArray
 from handeye.types.pose import Pose
 

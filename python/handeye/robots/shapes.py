@@ -7,20 +7,9 @@ from pathlib import Path, PurePosixPath
 
 from handeye.errors import InputError
 from handeye.robots.model import Arm
-from handeye.robots.urdf import (
-    Edge,
-    attribute_of,
-    edges_of,
-    links_of,
-    number_of,
-    path_of,
-    placed,
-    read_file,
-    tree_of,
-    triple,
-    unusable,
-)
+from handeye.robots.urdf import Edge, edges_of, links_of, path_of, read_file, tree_of
 from handeye.robots.xml_tree import Element, read_xml
+from handeye.robots.xml_values import attribute_of, number_of, placed, triple, unusable
 from handeye.types.pose import Pose
 
 MAX_SHAPES = 1000

@@ -157,8 +157,8 @@ def _moved(
     if random.uniform() < 0.5 or k + 1 == len(views):
         return _twist(random, millimetres, MOVING_DEG)
     way = (views[k].T_base_flange.inverse() @ views[k + 1].T_base_flange).log()
-    share = between(random, millimetres) / MM_PER_M / float(np.linalg.norm(way[:3]))
-    return way * min(share, 0.25)
+    length = max(float(np.linalg.norm(way[:3])), 1e-6)  # some arms only turn from one view to the next
+    return way * min(between(random, millimetres) / MM_PER_M / length, 0.25)
 
 
 def at(view: View, pose: Pose) -> View:

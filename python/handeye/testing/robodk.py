@@ -38,22 +38,35 @@ class MockRoboDK:
         self._speed_rad_s = 1.0
         self._motion: tuple[threading.Thread, threading.Event] | None = None
         self._links: list[socket.socket] = []
-        self._server = socket.create_server(("127.0.0.1", 0))
-        self.address = f"127.0.0.1:{self._server.getsockname()[1]},{name}"
-        threading.Thread(target=self._serve, daemon=True).start()
+        self._port = 0
+        self.mend()
+        self.address = f"127.0.0.1:{self._port},{name}"
 
-    def close(self) -> None:
-        """Stop listening and moving."""
+    def cut(self) -> None:
+        """End every connection and take no other; a motion that runs goes on."""
+        with suppress(OSError):  # wakes who waits for connections; some systems refuse that
+            self._server.shutdown(socket.SHUT_RDWR)
         self._server.close()
         for link in self._links:
             with suppress(OSError):
                 link.shutdown(socket.SHUT_RDWR)
+        self._links.clear()
+
+    def mend(self) -> None:
+        """Listen again, where it did before."""
+        self._server = socket.create_server(("127.0.0.1", self._port))
+        self._port = int(self._server.getsockname()[1])
+        threading.Thread(target=self._serve, args=(self._server,), daemon=True).start()
+
+    def close(self) -> None:
+        """Stop listening and moving."""
+        self.cut()
         self._halt()
 
-    def _serve(self) -> None:
+    def _serve(self, server: socket.socket) -> None:
         while True:
             try:
-                link, _ = self._server.accept()
+                link, _ = server.accept()
             except OSError:
                 return
             self._links.append(link)

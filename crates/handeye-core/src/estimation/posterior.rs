@@ -360,21 +360,36 @@ fn attribution(mixed: &Mixed, mode: &Mode, theta: &DVector<f64>) -> Result<Vec<A
         .collect()
 }
 
-/// Degrees of freedom of a covariance that is known only so well: a scaled chi-square whose logarithm spreads as the
-/// sizes of the nodes' covariances do.
+/// Degrees of freedom of a covariance that is known only so well.
+///
+/// A variance of `nu` degrees of freedom spreads by `2 / nu` in its logarithm. How much that of the nodes' covariances
+/// does is the mean over all directions, each in units of what is likeliest: of a symmetric matrix `A` the mean of
+/// `(u' A u)^2` over unit vectors in `n` dimensions is `(2 |A|^2 + tr(A)^2) / (n (n + 2))`.
 fn degrees_of_freedom(nodes: &[Node], block: impl Fn(&DMatrix<f64>) -> Matrix6<f64>) -> f64 {
-    let sizes: Vec<f64> = nodes
+    let total: f64 = nodes.iter().map(|n| n.weight).sum();
+    let mean = |of: &dyn Fn(usize) -> Matrix6<f64>| -> Matrix6<f64> {
+        (0..nodes.len()).map(|i| of(i) * (nodes[i].weight / total)).sum()
+    };
+    let Some(unit) = mean(&|i| block(&nodes[i].covariance)).cholesky().and_then(|f| f.l().try_inverse())
+    else {
+        return FEWEST_DEGREES_OF_FREEDOM;
+    };
+    let logarithms: Vec<Matrix6<f64>> = nodes
         .iter()
         .map(|node| {
-            // In standard deviations, as metres and radians differ by orders.
-            block(&node.covariance)
-                .cholesky()
-                .map_or(f64::NAN, |f| f.l_dirty().diagonal().map(f64::ln).sum() / 3.0)
+            let mut eigen = (unit * block(&node.covariance) * unit.transpose()).symmetric_eigen();
+            eigen.eigenvalues.apply(|x| *x = x.max(f64::MIN_POSITIVE).ln());
+            eigen.recompose()
         })
         .collect();
-    let usable = || nodes.iter().zip(&sizes).filter(|(_, s)| s.is_finite());
-    let total: f64 = usable().map(|(n, _)| n.weight).sum();
-    let mean = usable().map(|(n, s)| n.weight * s).sum::<f64>() / total;
-    let variance = usable().map(|(n, s)| n.weight * (s - mean).powi(2)).sum::<f64>() / total;
-    (2.0 / variance.max(1e-12)).max(FEWEST_DEGREES_OF_FREEDOM)
+    let centre = mean(&|i| logarithms[i]);
+    let spread: f64 = logarithms
+        .iter()
+        .zip(nodes)
+        .map(|(a, node)| {
+            let away = a - centre;
+            node.weight * (2.0 * away.norm_squared() + away.trace().powi(2)) / 48.0
+        })
+        .sum();
+    (2.0 * total / spread.max(1e-12)).max(FEWEST_DEGREES_OF_FREEDOM)
 }

@@ -47,6 +47,8 @@ class XArmRobot:
         The control box is not there.
     """
 
+    _link: socket.socket | None = None
+
     def __init__(self, address: str) -> None:
         where, _, count = address.partition(",")
         self._host, _, port = where.partition(":")
@@ -55,7 +57,6 @@ class XArmRobot:
             raise InputError(f"address {address[:60]!r}, expected HOST:PORT,JOINTS", code="bad_address")
         self._port, self._count = int(port or PORT), int(count or 6)
         self._one_at_a_time = threading.Lock()
-        self._link: socket.socket | None = None
         self._number = 0
         self._stopped = threading.Event()
         self._ask(GET_STATE)
@@ -125,6 +126,10 @@ class XArmRobot:
         """Let go of the connection."""
         with self._one_at_a_time:
             self._forget()
+
+    def __del__(self) -> None:
+        # Nobody closes the drivers of a session that has ended.
+        self._forget()
 
     def _state(self) -> int:
         return self._ask(GET_STATE, size=1)[0]
