@@ -35,6 +35,7 @@ LATEST_REFUSAL = 6
 # Most postures are drawn around those that show the board: elsewhere it would rarely be seen whole.
 NEAR_ANOTHER = 0.8
 _TRIES = 20_000
+_CELLS = 5
 
 
 @dataclass(frozen=True)
@@ -174,11 +175,21 @@ def _mounted(random: np.random.Generator, mounting: Mounting) -> tuple[Pose, Pos
 def made_cell(random: np.random.Generator, mounting: Mounting, count: int) -> tuple[Measurements, Pose]:
     """Draw a cell: its views, postures one after the other with the board whole in the picture, and X.
 
+    One whose arm cannot show its board is drawn anew.
+
     Raises
     ------
     SolveError
         Too few postures show the board.
     """
+    for _ in range(_CELLS):
+        found = _cell(random, mounting, count)
+        if found is not None:
+            return found
+    raise SolveError(f"no {count} views in {_CELLS} cells of {_TRIES} tries", code="no_views")
+
+
+def _cell(random: np.random.Generator, mounting: Mounting, count: int) -> tuple[Measurements, Pose] | None:
     arm = five_joint_arm()
     zeros = np.deg2rad(random.normal(0, 1.0, len(arm)))
     zeros[[0, -1]] = 0.0
@@ -214,6 +225,6 @@ def made_cell(random: np.random.Generator, mounting: Mounting, count: int) -> tu
         reported = Pose(arm.forward(read))
         views.append(View(f"view_{len(views) + 1:02d}", reported, ids, pixels, joints_rad=read.tolist()))
     else:
-        raise SolveError(f"{len(views)} of {count} views in {_TRIES} tries", code="no_views")
+        return None
     camera = Camera(LENS, PARAMETERS, *SIZE_PX, covariance=covariance)
     return Measurements.of(mounting, camera, BOARD, views), X
