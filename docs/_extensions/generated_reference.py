@@ -15,7 +15,11 @@ from rich.console import Console
 from sphinx.application import Sphinx
 from sphinx.util.typing import ExtensionMetadata
 
+from handeye import errors
 from handeye.cli.app import COMMANDS, make_app
+from handeye.cli.failures import UnexpectedError, UsageError
+from handeye.codes import Code
+from handeye.errors import HandeyeError
 
 ROOMS = ("handeye", "handeye.types", "handeye.errors", "handeye.datasets", "handeye.detection")
 ROOMS += ("handeye.estimation", "handeye.planning", "handeye.robots", "handeye.cameras", "handeye.session")
@@ -141,12 +145,42 @@ def command_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def codes_page() -> str:
+    """Return the page of all codes of errors."""
+    rows = (f"| `{code}` | {code.meaning} | {code.advice} |" for code in sorted(Code))
+    lines = [
+        "# Codes of errors",
+        "",
+        "What `error.code` can be, in Python and in the output of `--json`; data faults have",
+        "[pages of their own](../faults/index.md), and drivers of other packages may add words.",
+        "The command line shows the last column where an error has no hint of its own.",
+        "",
+        "| code | what it means | what to do |",
+        "|---|---|---|",
+        *(row.replace("<", "&lt;") for row in rows),
+        "",
+        "## Exit codes",
+        "",
+        "The class of the error decides the exit code of the command line.",
+        "",
+        "| class | exit code | its code where none is given |",
+        "|---|---|---|",
+    ]
+    kinds = [kind for kind in vars(errors).values() if inspect.isclass(kind)]
+    lines += [
+        f"| `{kind.__name__}` | {int(kind.exit_code)} | `{kind.default_code}` |"
+        for kind in [*(k for k in kinds if issubclass(k, HandeyeError)), UsageError, UnexpectedError]
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def write(app: Sphinx) -> None:
     """Write the pages, and touch none that is as it should be."""
     folder = Path(app.srcdir) / "reference"
     folder.mkdir(exist_ok=True)
     stub = Path(app.srcdir).parent / "python" / "handeye" / "_core.pyi"
     pages = {"python.md": python_page(), "core.md": core_page(stub), "command-line.md": command_page()}
+    pages["codes.md"] = codes_page()
     for name, text in pages.items():
         path = folder / name
         if not path.exists() or path.read_text() != text:

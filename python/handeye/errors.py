@@ -60,7 +60,8 @@ class HandeyeError(Exception):
     message
         What was found and what was expected, for a person.
     code
-        A stable lower-case word for scripts, such as `not_rigid`; by default the `default_code` of the class.
+        A stable lower-case word for scripts, such as `not_rigid`: one of `handeye.codes.Code`, or a driver's
+        own; by default the `default_code` of the class.
     hint
         What to do about it, or None.
 

@@ -69,8 +69,14 @@ def test_each_kind_of_error_has_its_exit_code(
     }
 
 
-def test_error_without_hint(handeye: Handeye, ending: Ending) -> None:
-    ending.how = InputError("so")
+def test_error_without_hint_has_the_advice_of_its_code(handeye: Handeye, ending: Ending) -> None:
+    ending.how = InputError("so", code="truncated_image")
+    assert handeye("run").err == "error: so\nhint: copy the file again\n"
+    assert handeye("run", "--json").error["hint"] == "copy the file again"
+
+
+def test_code_of_another_package_has_no_hint(handeye: Handeye, ending: Ending) -> None:
+    ending.how = InputError("so", code="lamp_off")
     assert handeye("run").err == "error: so\n"
     assert handeye("run", "--json").error["hint"] is None
 

@@ -15,6 +15,7 @@ from cyclopts import CycloptsError
 from handeye.cli.answer import Answer, json_text
 from handeye.cli.app import COMMANDS, make_app
 from handeye.cli.failures import UnexpectedError, UsageError, WarnedError
+from handeye.codes import advice
 from handeye.errors import ExitCode, HandeyeError, InputError, OutputError, UnstatedError
 
 INTERRUPTED = int(ExitCode.INTERRUPTED)
@@ -130,11 +131,12 @@ def _print(answer: Answer, *, as_json: bool) -> None:
 
 
 def _fail(error: HandeyeError, warnings: tuple[str, ...] = (), *, as_json: bool, debug: bool) -> int:
+    hint = advice(error.code) if error.hint is None else error.hint
     if as_json and sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison]
         described = {
             "code": error.code,
             "message": error.message,
-            "hint": error.hint,
+            "hint": hint,
             "exit_code": int(error.exit_code),
         }
         try:
@@ -147,8 +149,8 @@ def _fail(error: HandeyeError, warnings: tuple[str, ...] = (), *, as_json: bool,
     for warning in warnings:
         _complain(f"warning: {warning}")
     _complain(f"error: {error.message}")
-    if error.hint is not None:
-        _complain(f"hint: {error.hint}")
+    if hint is not None:
+        _complain(f"hint: {hint}")
     return int(error.exit_code)
 
 
