@@ -7,6 +7,8 @@ found and what was expected, a `code` that a script can compare, and a `hint` th
 from enum import IntEnum
 from typing import ClassVar
 
+from handeye.codes import Code
+
 __all__ = [
     "DegenerateError",
     "DetectionError",
@@ -76,11 +78,11 @@ class HandeyeError(Exception):
     """
 
     exit_code: ClassVar[ExitCode] = ExitCode.SOLVE
-    default_code: ClassVar[str] = "error"
+    default_code: ClassVar[str] = Code.ERROR
 
     def __init__(self, message: str, *, code: str | None = None, hint: str | None = None) -> None:
         super().__init__(message)
-        self.code = self.default_code if code is None else code
+        self.code: Code | str = self.default_code if code is None else code
         self.hint = hint
 
     @property
@@ -99,7 +101,7 @@ class InputError(HandeyeError):
     """
 
     exit_code = ExitCode.UNUSABLE_INPUT
-    default_code = "invalid_input"
+    default_code = Code.INVALID_INPUT
 
 
 class UnstatedError(InputError):
@@ -116,7 +118,7 @@ class UnstatedError(InputError):
     ('--notation', 'ur')
     """
 
-    default_code = "notation_unstated"
+    default_code = Code.NOTATION_UNSTATED
 
     def __init__(
         self, message: str, *, hint: str, options: tuple[str, ...] = (), code: str | None = None
@@ -130,12 +132,12 @@ class DegenerateError(HandeyeError):
 
     Examples
     --------
-    >>> DegenerateError("the views turn about one axis").code
-    'degenerate'
+    >>> print(DegenerateError("the views turn about one axis").code)
+    degenerate
     """
 
     exit_code = ExitCode.DEGENERATE
-    default_code = "degenerate"
+    default_code = Code.DEGENERATE
 
 
 class DetectionError(HandeyeError):
@@ -148,7 +150,7 @@ class DetectionError(HandeyeError):
     """
 
     exit_code = ExitCode.DETECTION
-    default_code = "not_detected"
+    default_code = Code.NOT_DETECTED
 
 
 class SolveError(HandeyeError):
@@ -161,7 +163,7 @@ class SolveError(HandeyeError):
     """
 
     exit_code = ExitCode.SOLVE
-    default_code = "not_solved"
+    default_code = Code.NOT_SOLVED
 
 
 class OutputError(HandeyeError):
@@ -169,12 +171,12 @@ class OutputError(HandeyeError):
 
     Examples
     --------
-    >>> OutputError("the disk is full").code
-    'not_written'
+    >>> print(OutputError("the disk is full").code)
+    not_written
     """
 
     exit_code = ExitCode.OUTPUT
-    default_code = "not_written"
+    default_code = Code.NOT_WRITTEN
 
 
 class DeviceError(HandeyeError):
@@ -187,4 +189,4 @@ class DeviceError(HandeyeError):
     """
 
     exit_code = ExitCode.DEVICE
-    default_code = "device_failed"
+    default_code = Code.DEVICE_FAILED

@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from handeye.codes import Code
 from handeye.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -41,6 +42,6 @@ def library(module: str, extra: str) -> Any:  # noqa: ANN401 - a module without 
         found = "is not installed" if absent else f"cannot be loaded: {error}"
         raise DeviceError(
             f"the library {package} {found}",
-            code="library_missing",
+            code=Code.LIBRARY_MISSING,
             hint=f"pip install 'handeye[{extra}]'",
         ) from error

@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from handeye.codes import Code
 from handeye.errors import HandeyeError
 
 PACKAGES = (
@@ -109,6 +110,6 @@ def peak_memory_mb() -> float:
     try:
         import resource  # noqa: PLC0415 - not on every system
     except ImportError:
-        raise HandeyeError("this system does not tell the peak memory", code="unsupported") from None
+        raise HandeyeError("this system does not tell the peak memory", code=Code.UNSUPPORTED) from None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / 2**20 if sys.platform == "darwin" else peak / 2**10

@@ -8,6 +8,7 @@ from typing import Any
 from handeye.benchmarks.machine import peak_memory_mb
 from handeye.benchmarks.options import Options
 from handeye.benchmarks.problems import candidates, make_cell
+from handeye.codes import Code
 from handeye.compute.parallel import Progress
 from handeye.errors import HandeyeError
 
@@ -29,7 +30,7 @@ def bench_memory(options: Options, progress: Progress) -> dict[str, Any]:
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - this file
     if done.returncode != 0:
         raise HandeyeError(
-            f"scoring {count} candidates failed: {done.stderr.strip()}", code="benchmark_failed"
+            f"scoring {count} candidates failed: {done.stderr.strip()}", code=Code.BENCHMARK_FAILED
         )
     progress(1, 1)
     found: dict[str, Any] = json.loads(done.stdout)

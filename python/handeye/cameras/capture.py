@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from handeye.cameras.protocol import Frame
+from handeye.codes import Code
 from handeye.errors import DeviceError
 
 # Drivers keep old pictures in a queue; so many are thrown away before one is believed to be of now.
@@ -33,7 +34,7 @@ class Capture:
         self._capture = cv2.VideoCapture(source)
         if not self._capture.isOpened():
             raise DeviceError(
-                f"camera {source}: cannot be opened", code="no_camera", hint="is another program using it?"
+                f"camera {source}: cannot be opened", code=Code.NO_CAMERA, hint="is another program using it?"
             )
         if size_px is not None:
             self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, size_px[0])
@@ -51,10 +52,10 @@ class Capture:
             self._capture.grab()
         good, picture = self._capture.read()
         if not good:
-            raise DeviceError(f"camera {self._source}: no picture for {label}", code="no_image")
+            raise DeviceError(f"camera {self._source}: no picture for {label}", code=Code.NO_IMAGE)
         grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
         if grey.dtype != np.uint8:
             raise DeviceError(
-                f"camera {self._source}: pixels of {grey.dtype}, expected 8 bits", code="bad_image"
+                f"camera {self._source}: pixels of {grey.dtype}, expected 8 bits", code=Code.BAD_IMAGE
             )
         return Frame(np.ascontiguousarray(grey, dtype=np.uint8), timestamp_s=time.time())

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handeye.cameras.protocol import Frame, Grey
+from handeye.codes import Code
 from handeye.errors import DeviceError, HandeyeError
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"})
@@ -108,7 +109,7 @@ class WatchedFolder:
         also = "".join(f"; {name} {why}" for name, why in list(passed.items())[-3:])
         raise DeviceError(
             f"{self._folder}: no new picture within {self._patience_s:g} s{also}",
-            code="timeout",
+            code=Code.TIMEOUT,
             hint=f"save pictures there as {', '.join(sorted(SUFFIXES))}, once they are asked for",
         )
 
@@ -132,7 +133,7 @@ class WatchedFolder:
         try:
             return Frame(self._read(path), timestamp_s=modified_s), ""
         except HandeyeError as error:
-            raise DeviceError(error.message, code="bad_image", hint=error.hint) from error
+            raise DeviceError(error.message, code=Code.BAD_IMAGE, hint=error.hint) from error
 
     def _listed(self) -> dict[str, _State]:
         """Return the pictures in the folder that hold something, with their states."""
@@ -151,5 +152,5 @@ class WatchedFolder:
                             status.st_mtime_ns, status.st_ctime_ns, status.st_size, status.st_ino
                         )
         except OSError as error:
-            raise DeviceError(f"{self._folder}: {error.strerror or error}", code="folder_gone") from error
+            raise DeviceError(f"{self._folder}: {error.strerror or error}", code=Code.FOLDER_GONE) from error
         return found

@@ -7,12 +7,13 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.types.arrays import FloatArray, IndexArray, finite_array, index_array
 
 Grey = NDArray[np.uint8]
 # Code of what a driver returned that is no picture.
-BAD_FRAME = "bad_frame"
+BAD_FRAME = Code.BAD_FRAME
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +53,11 @@ class Frame:
 
     def __post_init__(self) -> None:
         if self.image is None and self.points is None:
-            raise InputError("frame: neither image nor points", code="invalid_field")
+            raise InputError("frame: neither image nor points", code=Code.INVALID_FIELD)
         if self.image is not None and (self.image.ndim != 2 or self.image.dtype != np.uint8):
             raise InputError(
                 f"frame: shape {self.image.shape} of {self.image.dtype}, expected grey values of uint8",
-                code="wrong_shape",
+                code=Code.WRONG_SHAPE,
             )
 
 

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.pattern import Mask, Pattern
 from handeye.types import Camera, Pose, Target
@@ -95,7 +96,8 @@ class BoardRenderer:
         look = self.appearance
         if isinstance(look.background, np.ndarray) and look.background.shape != (height, width):
             raise InputError(
-                f"background: shape {look.background.shape}, expected {(height, width)}", code="wrong_shape"
+                f"background: shape {look.background.shape}, expected {(height, width)}",
+                code=Code.WRONG_SHAPE,
             )
         self._pattern = Pattern(self.target)
         span = self._pattern.high - self._pattern.low
@@ -120,7 +122,7 @@ class BoardRenderer:
         """
         look = self.appearance
         if look.noise > 0 and random is None:
-            raise InputError("noise needs a random generator", code="invalid_field")
+            raise InputError("noise needs a random generator", code=Code.INVALID_FIELD)
         width, height = self.camera.size_px
         rows, columns = self._region(T_camera_target)
         board, ink = self._shares(T_camera_target, rows, columns)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from handeye.cameras.protocol import Frame, Grey, Points
+from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.types import View
 
@@ -36,6 +37,6 @@ class ReplayCamera:
         """
         view = self._standing_at()
         if view is None:
-            raise DeviceError(f"{label}: the robot stands at no recorded view", code="nothing_recorded")
+            raise DeviceError(f"{label}: the robot stands at no recorded view", code=Code.NOTHING_RECORDED)
         image = None if self._read is None else self._read(view)
         return Frame(image, Points(view.point_ids, view.pixels, labels_known=True), view.timestamp_s)

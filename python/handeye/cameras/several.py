@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 from handeye.cameras.protocol import Frame, ImageSource
+from handeye.codes import Code
 from handeye.errors import DeviceError
 
 
@@ -40,7 +41,7 @@ class SeveralCameras:
         errors = {name: each.exception() for name, each in waiting.items()}
         for name, error in errors.items():
             if error is not None:
-                code, hint = "driver_failed", None
+                code, hint = Code.DRIVER_FAILED, None
                 if isinstance(error, DeviceError):
                     code, hint = error.code, error.hint
                 raise DeviceError(f"camera {name}: {error}", code=code, hint=hint) from error

@@ -10,6 +10,7 @@ import numpy as np
 from handeye import _core
 from handeye.cameras.protocol import Frame, Grey, Points
 from handeye.cameras.render import Appearance, BoardRenderer
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types import Camera, Pose, Target
 
@@ -43,7 +44,7 @@ class Optics:
 
     def __post_init__(self) -> None:
         if not self.exposure > 0 or not 0 <= self.occluded_share <= 1:
-            raise InputError("optics: exposure above zero and a share from 0 to 1", code="out_of_range")
+            raise InputError("optics: exposure above zero and a share from 0 to 1", code=Code.OUT_OF_RANGE)
 
 
 class SimulatedCamera:

@@ -13,6 +13,7 @@ from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, check_picture, write_figure, write_json
 from handeye.cli.source import Source
+from handeye.codes import Code
 from handeye.datasets.check_log import LoggedCheck, append_check, change_of, read_check_log
 from handeye.datasets.images import read_image
 from handeye.detection import NotFound, detect
@@ -110,7 +111,7 @@ def _of_the_same(new: Recording, calibrated: Recording) -> tuple[View, ...]:
         raise InputError(
             f"{new.name}: {printable(new.target, 120)}, the calibration has "
             f"{printable(calibrated.target, 120)}",
-            code="another_target",
+            code=Code.ANOTHER_TARGET,
             hint="take pictures of the same target, and state it alike",
         )
     return new.views
@@ -129,13 +130,13 @@ def _pictured(picture: Path, at: str, recording: Recording) -> View:
     there = next((view for view in recording.views if view.name == at), None)
     if there is None:
         names = ", ".join(view.name for view in recording.views)
-        raise InputError(f"no view {at[:100]!r}", code="unknown_view", hint=f"views are {names[:300]}")
+        raise InputError(f"no view {at[:100]!r}", code=Code.UNKNOWN_VIEW, hint=f"views are {names[:300]}")
     image = read_image(picture)
     width, height = recording.camera.size_px
     if image.shape != (height, width):
         raise InputError(
             f"{picture}: {image.shape[1]} x {image.shape[0]} px, the camera has {width} x {height}",
-            code="wrong_image_size",
+            code=Code.WRONG_IMAGE_SIZE,
         )
     found = detect(image, recording.target)
     if isinstance(found, NotFound):

@@ -14,6 +14,7 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
 from handeye.cli.source import Board
+from handeye.codes import Code
 from handeye.datasets import ImageSet, LoadedRecording, UnreadPoses, load
 from handeye.datasets.image_header import IMAGE_SUFFIXES
 from handeye.datasets.images import read_image
@@ -105,7 +106,8 @@ def _pictures(path: Path) -> list[Path]:
         if pictures:
             return pictures
     raise InputError(
-        f"{folder}: no picture, expected files such as {', '.join(sorted(IMAGE_SUFFIXES))}", code="no_images"
+        f"{folder}: no picture, expected files such as {', '.join(sorted(IMAGE_SUFFIXES))}",
+        code=Code.NO_IMAGES,
     )
 
 

@@ -8,6 +8,7 @@ from handeye.cli.arm import ArmSource
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.source import Source
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation import solve
 from handeye.estimation.difference import difference
@@ -50,7 +51,7 @@ def diff(
     if mounting is not other:
         raise InputError(
             f"{first} is {mounting.value}, {second} is {other.value}: two different transforms",
-            code="wrong_mounting",
+            code=Code.WRONG_MOUNTING,
             hint="compare calibrations of one camera",
         )
     found = difference(one, two)

@@ -11,6 +11,7 @@ from handeye.cli.options import Common
 from handeye.cli.progress import progress
 from handeye.cli.run_options import Simulated
 from handeye.cli.source import Board
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.planning.constraints import ViewLimits
 from handeye.types import Mounting
@@ -72,7 +73,9 @@ def expect(
 
     target, pattern = board.described()
     if pattern is not None:
-        raise InputError("--pitch-mm is missing", code="missing_value", hint="say how large the squares are")
+        raise InputError(
+            "--pitch-mm is missing", code=Code.MISSING_VALUE, hint="say how large the squares are"
+        )
     configuration = Configuration(
         robot,
         mounting=mounting,

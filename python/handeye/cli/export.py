@@ -14,6 +14,7 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_output
 from handeye.cli.solve_poses import ONLY_POSES
 from handeye.cli.source import Source
+from handeye.codes import Code
 from handeye.datasets import PosePairs
 from handeye.datasets.writing import replace_file
 from handeye.errors import InputError
@@ -146,14 +147,14 @@ def _of_rig(opened: OpenedRig, only: str | None, *, reduced: bool) -> Result:
         asked = "" if only is None else f"no camera {only[:60]!r}; "
         raise InputError(
             f"{asked}{len(names)} cameras ({', '.join(names)})",
-            code="several_cameras",
+            code=Code.SEVERAL_CAMERAS,
             hint="name one with --only",
         )
     rig = solve_rig(opened.recording, reduced=reduced)
     if rig.targets_of[only] is None:
         raise InputError(
             f"camera {only}: saw no target that the arm moves against it, and formats name one",
-            code="not_tied",
+            code=Code.NOT_TIED,
             hint="take its pose from the JSON of handeye solve",
         )
     return Result.of(rig.cameras[only], opened.recording.name, [*map(str, opened.warnings), *rig.warnings])

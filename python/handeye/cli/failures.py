@@ -1,5 +1,6 @@
 """Errors that only a command line has."""
 
+from handeye.codes import Code
 from handeye.errors import ExitCode, HandeyeError
 
 
@@ -16,11 +17,11 @@ class UsageError(HandeyeError):
     """The command line is not understood, or asks for what does not go together."""
 
     exit_code = ExitCode.USAGE
-    default_code = "usage"
+    default_code = Code.USAGE
 
 
 class UnexpectedError(HandeyeError):
     """Something that should not have happened."""
 
     exit_code = ExitCode.UNEXPECTED
-    default_code = "unexpected"
+    default_code = Code.UNEXPECTED

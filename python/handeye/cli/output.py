@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import json_text
+from handeye.codes import Code
 from handeye.datasets.writing import is_occupied, replace_file
 from handeye.errors import OutputError
 
@@ -43,7 +44,7 @@ def check_picture(path: Path) -> None:
 def _picture_kind(path: Path) -> str:
     kind = path.suffix.lower().removeprefix(".")
     if kind not in {"png", "svg", "pdf"}:
-        raise OutputError(f"{path}: no picture format, expected .png, .svg or .pdf", code="unknown_format")
+        raise OutputError(f"{path}: no picture format, expected .png, .svg or .pdf", code=Code.UNKNOWN_FORMAT)
     return kind
 
 
@@ -57,7 +58,7 @@ def check_new_folder(path: Path) -> None:
     """
     if is_occupied(path):
         raise OutputError(
-            f"{path}: exists already and is not empty", code="exists", hint="choose another name"
+            f"{path}: exists already and is not empty", code=Code.EXISTS, hint="choose another name"
         )
     if not path.parent.is_dir():
         raise OutputError(f"{path}: the folder {path.parent} does not exist", hint="create it first")

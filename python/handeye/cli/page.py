@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter, validators
 
+from handeye.codes import Code
 from handeye.datasets.writing import write_file
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Measurements, RigCalibration
@@ -103,7 +104,7 @@ class _Upload:
     def __call__(self, content: bytes) -> str:
         ending = next((e for start, e in _BEGINNINGS.items() if content.startswith(start)), None)
         if ending is None:
-            raise InputError("not a picture: expected PNG, JPEG, BMP or TIFF", code="bad_image")
+            raise InputError("not a picture: expected PNG, JPEG, BMP or TIFF", code=Code.BAD_IMAGE)
         while True:
             self._count += 1
             path = self._folder / f"brought_{self._count:03d}.{ending}"

@@ -20,6 +20,7 @@ from handeye.cli.plan_rig import plan_rig
 from handeye.cli.plan_together import Together, check_together, choose_together, show_together, together_data
 from handeye.cli.source import Source, mindful_of
 from handeye.cli.work import WorkOptions, check_touch, touch_lines
+from handeye.codes import Code
 from handeye.datasets import read_poses
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Measurements, make_estimator
@@ -298,13 +299,13 @@ def _taken(
             why = measurements.rejected.get(name)
             raise InputError(
                 f"view {name!r}: {'not in the folder' if why is None else why}",
-                code="unknown_view" if why is None else "unusable_view",
+                code=Code.UNKNOWN_VIEW if why is None else Code.UNUSABLE_VIEW,
                 hint=f"the views are {', '.join(names[:20])}{' ...' if len(names) > 20 else ''}",
             )
     if not with_file and len(taken) == len(names):
         raise InputError(
             f"all {len(names)} usable views count as taken, nothing is left to rank",
-            code="no_candidates",
+            code=Code.NO_CANDIDATES,
             hint="let fewer count as taken with --first or --used, or give poses with --candidates",
         )
     return taken

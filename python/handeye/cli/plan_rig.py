@@ -9,6 +9,7 @@ from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
 from handeye.cli.output import write_json
 from handeye.cli.source import mindful_of
+from handeye.codes import Code
 from handeye.datasets import PoseTable
 from handeye.errors import InputError
 from handeye.estimation import RigMeasurements, estimate_rig
@@ -60,7 +61,7 @@ def plan_rig(
     if len(pool) == 0:
         raise InputError(
             "no candidate: every station is taken",
-            code="no_candidate",
+            code=Code.NO_CANDIDATE,
             hint="give --candidates, or let fewer stations count as taken with --first or --used",
         )
     with mindful_of(opened.warnings):

@@ -11,6 +11,7 @@ from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output
 from handeye.cli.source import Source
+from handeye.codes import Code
 from handeye.datasets.writing import replace_file
 from handeye.errors import OutputError
 from handeye.importing import is_rig
@@ -55,7 +56,7 @@ def report(
     """
     check_output(output)
     if output.suffix.lower() not in {".html", ".htm"}:
-        raise OutputError(f"{output}: expected .html", code="unknown_format")
+        raise OutputError(f"{output}: expected .html", code=Code.UNKNOWN_FORMAT)
     from handeye.report import html_page, to_dict  # noqa: PLC0415 - other commands need no pictures
 
     if source.only is None and result.is_dir() and is_rig(result):

@@ -9,6 +9,7 @@ from handeye.cli.arm import ArmSource
 from handeye.cli.output import write_json
 from handeye.cli.page import Page, serve, show_rig
 from handeye.cli.source import mindful_of
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation import RigCalibration, solve_rig
 from handeye.estimation.certificate import Certificate, certify_rig
@@ -41,7 +42,9 @@ def answer_for_rig(
         As for `handeye.estimation.solve_rig`.
     """
     if model is ModelName.PAPER:
-        raise InputError("the paper's model has one camera", code="several_cameras", hint="leave --model out")
+        raise InputError(
+            "the paper's model has one camera", code=Code.SEVERAL_CAMERAS, hint="leave --model out"
+        )
     with mindful_of(opened.warnings):
         rig = solve_rig(opened.recording, reduced=reduced, kinematics=kinematics, camera_fixed=camera_fixed)
     data = rig_data(opened, rig)

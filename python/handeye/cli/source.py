@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError, WarnedError
 from handeye.cli.progress import progress
+from handeye.codes import Code
 from handeye.datasets import DataWarning, PosePairs, Statement, read_camera, read_cameras, read_target
 from handeye.datasets.recording_header import FILE_NAME
 from handeye.errors import HandeyeError, InputError
@@ -189,7 +190,7 @@ class Source(Board):
         if self.only is None:
             raise InputError(
                 f"{folder}: several cameras ({', '.join(opened.recording.cameras)}), expected one",
-                code="several_cameras",
+                code=Code.SEVERAL_CAMERAS,
                 hint="name one with --only; handeye solve and handeye plan take them together",
             )
         return one_camera(opened, self.only)

@@ -10,6 +10,7 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
 from handeye.cli.study_options import Data, Trials, write_results
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.mounting import Mounting
 
@@ -344,7 +345,7 @@ def mistakes(
     unknown = [kind for kind in kinds if kind not in known]
     if unknown:
         raise InputError(
-            f"no mistake {unknown[0]!r}", code="unknown_kind", hint=f"there are {', '.join(known)}"
+            f"no mistake {unknown[0]!r}", code=Code.UNKNOWN_KIND, hint=f"there are {', '.join(known)}"
         )
     check_folder(trials.output)
     sets = data.load((), trials.processes) if data.sets else []

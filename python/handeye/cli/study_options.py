@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from handeye.cli.options import Seed
 from handeye.cli.output import write_figure, write_json
 from handeye.cli.progress import progress
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.calibration import ModelName
 
@@ -85,7 +86,7 @@ class Trials(Effort):
         """
         trials = usual if self.trials is None else self.trials
         if trials < 1:
-            raise InputError(f"{trials} trials, expected at least 1", code="out_of_range")
+            raise InputError(f"{trials} trials, expected at least 1", code=Code.OUT_OF_RANGE)
         return trials
 
 

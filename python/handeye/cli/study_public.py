@@ -12,6 +12,7 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_folder
 from handeye.cli.progress import progress
 from handeye.cli.study_options import Data, Trials, versions, write_results
+from handeye.codes import Code
 from handeye.errors import InputError
 
 if TYPE_CHECKING:
@@ -100,13 +101,13 @@ def _part(
         if kinhec is None:
             raise InputError(
                 "no folder of KinHEC",
-                code="no_data",
+                code=Code.NO_DATA,
                 hint="kinhec generate --tier small --out FOLDER, then --kinhec FOLDER",
             )
         with progress("Running KinHEC's benchmark") as advance:
             return study_kinhec(kinhec, tracks=tracks, most=most, progress=advance).to_dict()
     if folder is None:
-        raise InputError("no folder of your own", code="no_data", hint="name one with --folder")
+        raise InputError("no folder of your own", code=Code.NO_DATA, hint="name one with --folder")
     from handeye.importing import open_folder  # noqa: PLC0415
     from handeye.studies.halves import study_halves  # noqa: PLC0415
 

@@ -10,6 +10,7 @@ from handeye.cli.answer import Answer
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output
+from handeye.codes import Code
 from handeye.datasets import read_target
 from handeye.datasets.reading import located
 from handeye.datasets.writing import replace_file
@@ -148,7 +149,7 @@ def target(
     if config.exists() and not _holds(config, sheet.target):
         raise OutputError(
             f"{config}: describes another target",
-            code="exists",
+            code=Code.EXISTS,
             hint="name another file with --config, or remove this one; it may hold measures of a print",
         )
     replace_file(output, content)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from handeye.cli.answer import Answer
 from handeye.cli.output import write_json
 from handeye.cli.source import mindful_of
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.importing import OpenedRig
 from handeye.types.calibration import ModelName
@@ -37,7 +38,9 @@ def answer_for_rig(
         As for `handeye.validation.rig_splits.validate_rig`.
     """
     if model is ModelName.PAPER:
-        raise InputError("the paper's model has one camera", code="several_cameras", hint="leave --model out")
+        raise InputError(
+            "the paper's model has one camera", code=Code.SEVERAL_CAMERAS, hint="leave --model out"
+        )
     with mindful_of(opened.warnings):
         found = validate_rig(opened.recording, splits=splits, seed=seed, kinematics=kinematics)
     warnings = [*map(str, opened.warnings), *found.calibration.warnings]

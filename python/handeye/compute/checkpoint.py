@@ -19,6 +19,7 @@ from typing import IO, Any, TypeVar, get_type_hints
 
 import msgspec
 
+from handeye.codes import Code
 from handeye.compute.digest import Digester, program_digest
 from handeye.compute.parallel import Workers, run_each
 from handeye.errors import InputError, OutputError
@@ -120,7 +121,7 @@ def _open(folder: Path) -> IO[bytes]:
         pass
     except OSError:
         file.close()
-        raise InputError(f"{folder}: another process works with it", code="in_use") from None
+        raise InputError(f"{folder}: another process works with it", code=Code.IN_USE) from None
     return file
 
 
@@ -131,7 +132,7 @@ def _read(file: IO[bytes], wanted: set[bytes]) -> dict[bytes, bytes]:
     if header != HEADER:
         if not HEADER.startswith(header):
             file.close()
-            raise InputError(f"{file.name}: holds something else", code="unknown_format")
+            raise InputError(f"{file.name}: holds something else", code=Code.UNKNOWN_FORMAT)
         file.truncate(0)
         file.write(HEADER)
         _sync(file)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, TypeVar
 
+from handeye.codes import Code
 from handeye.compute.digest import program_digest
 from handeye.errors import HandeyeError, InputError
 
@@ -52,7 +53,7 @@ class Cluster:
         except (OSError, TimeoutError, ValueError) as error:
             raise InputError(
                 f"no Dask scheduler answers at {self.address}",
-                code="no_scheduler",
+                code=Code.NO_SCHEDULER,
                 hint="start one with: dask scheduler, and workers with: dask worker ADDRESS --nthreads 1",
             ) from error
         try:
@@ -66,7 +67,7 @@ def _distributed() -> Any:  # noqa: ANN401 - of a package that may be missing
         return import_module("distributed")
     except ModuleNotFoundError as error:
         raise InputError(
-            "Dask is not installed", code="no_dask", hint="install it with: pip install 'handeye[cluster]'"
+            "Dask is not installed", code=Code.NO_DASK, hint="install it with: pip install 'handeye[cluster]'"
         ) from error
 
 
@@ -114,10 +115,10 @@ def _run(
                 send(index)
                 continue
             raise HandeyeError(
-                f"piece {index}: its worker died {deaths[index]} times", code="workers_die"
+                f"piece {index}: its worker died {deaths[index]} times", code=Code.WORKERS_DIE
             ) from error
         if not isinstance(error, BaseException):
-            raise HandeyeError(f"piece {index}: {future.status}", code="cluster_failed")
+            raise HandeyeError(f"piece {index}: {future.status}", code=Code.CLUSTER_FAILED)
         raise error
 
 
@@ -132,7 +133,7 @@ def at_worker(work: Callable[[T], R], piece: T, program: str) -> R:
     if program_digest() != program:
         raise InputError(
             "a worker of the cluster runs another version of handeye or of its libraries",
-            code="other_program",
+            code=Code.OTHER_PROGRAM,
             hint="install the same package everywhere: results would not be the same",
         )
     return work(piece)

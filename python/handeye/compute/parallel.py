@@ -7,6 +7,7 @@ from typing import Any, Protocol, TypeVar
 
 from joblib import Parallel, delayed, parallel_config  # pyright: ignore[reportUnknownVariableType]
 
+from handeye.codes import Code
 from handeye.errors import InputError
 
 T = TypeVar("T")
@@ -80,7 +81,7 @@ def run_each(work: Callable[[T], R], pieces: Sequence[T], workers: Workers) -> G
     if not isinstance(workers, int):
         return workers.run(work, pieces)
     if workers < 1:
-        raise InputError(f"{workers} workers, expected at least 1", code="out_of_range")
+        raise InputError(f"{workers} workers, expected at least 1", code=Code.OUT_OF_RANGE)
     if workers == 1 or len(pieces) < 2:
         return _here(work, pieces)
     return _processes(work, pieces, workers)

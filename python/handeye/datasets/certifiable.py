@@ -13,6 +13,7 @@ hand A is the base in the hand.
 import re
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Importer
 from handeye.datasets.plausibility import DataWarning, pose_warnings
@@ -46,13 +47,15 @@ def read(path: Path, options: ImportOptions) -> PosePairs:
     if len(pairs) != 1:
         raise InputError(
             f"{path}: {', '.join(sorted(pairs)[:20]) or 'no tag'}, expected one tag and one camera",
-            code="ambiguous_format",
+            code=Code.AMBIGUOUS_FORMAT,
             hint="give one file, such as tag_0_cam_1_A.csv; all cameras at once need a recording",
         )
     ((name, (first, second)),) = pairs.items()
     hand, seen = _poses(first), _poses(second)
     if len(hand) != len(seen):
-        raise InputError(f"{first}: {len(hand)} poses, {second.name} has {len(seen)}", code="counts_differ")
+        raise InputError(
+            f"{first}: {len(hand)} poses, {second.name} has {len(seen)}", code=Code.COUNTS_DIFFER
+        )
     mounting = options.mounting or Mounting.EYE_TO_HAND
     base_flange = hand if mounting is Mounting.EYE_TO_HAND else [pose.inverse() for pose in hand]
     stations = numbered(list(zip(base_flange, seen, strict=True)))

@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from handeye.codes import Code
 from handeye.datasets.reading import read_text
 from handeye.errors import InputError, OutputError
 
@@ -65,7 +66,9 @@ def read_check_log(path: Path) -> list[LoggedCheck]:
             check = msgspec.json.decode(line, type=LoggedCheck)
         except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
             raise InputError(
-                f"{path}: line {number}: {error}", code="invalid_field", hint="name another file for the log"
+                f"{path}: line {number}: {error}",
+                code=Code.INVALID_FIELD,
+                hint="name another file for the log",
             ) from error
         checks.append(check)
     return checks

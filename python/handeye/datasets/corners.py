@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.reading import MIB, number, read_text
 from handeye.errors import InputError
 from handeye.types import View
@@ -42,9 +43,9 @@ def read_corners(path: Path) -> tuple[list[int], list[list[float]], list[float] 
     header = lines[0].replace(" ", "") if lines else ""
     if header not in {HEADER, f"{HEADER},{SIGMA}"}:
         found = lines[0][:60] if lines else ""
-        raise InputError(f"{path}: line 1: {found!r}, expected {HEADER}", code="invalid_field")
+        raise InputError(f"{path}: line 1: {found!r}, expected {HEADER}", code=Code.INVALID_FIELD)
     if len(lines) > MAX_POINTS + 1:
-        raise InputError(f"{path}: more than {MAX_POINTS} points", code="too_large")
+        raise InputError(f"{path}: more than {MAX_POINTS} points", code=Code.TOO_LARGE)
     names = header.split(",")
     ids: list[int] = []
     rows: list[list[float]] = []
@@ -54,9 +55,11 @@ def read_corners(path: Path) -> tuple[list[int], list[list[float]], list[float] 
         where = f"{path}: line {index}"
         fields = line.split(",")
         if len(fields) != len(names):
-            raise InputError(f"{where}: {len(fields)} values, expected {header}", code="wrong_shape")
+            raise InputError(f"{where}: {len(fields)} values, expected {header}", code=Code.WRONG_SHAPE)
         if not _ID.fullmatch(fields[0].strip()):
-            raise InputError(f"{where}: id {fields[0][:40]!r}, expected a whole number", code="not_numbers")
+            raise InputError(
+                f"{where}: id {fields[0][:40]!r}, expected a whole number", code=Code.NOT_NUMBERS
+            )
         ids.append(int(fields[0]))
         rows.append(
             [number(field, f"{where}: {name}") for field, name in zip(fields[1:], names[1:], strict=True)]

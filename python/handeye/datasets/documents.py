@@ -12,6 +12,7 @@ import re
 from pathlib import Path
 from typing import cast
 
+from handeye.codes import Code
 from handeye.datasets.reading import MIB, read_text
 from handeye.datasets.yaml_reading import MAX_BYTES as MAX_YAML_BYTES
 from handeye.datasets.yaml_reading import yaml_documents
@@ -60,7 +61,7 @@ def _json(path: Path) -> object:
     try:
         return cast("object", json.loads(text))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not JSON: {str(error)[:200]}", code="not_json") from error
+        raise InputError(f"{path}: not JSON: {str(error)[:200]}", code=Code.NOT_JSON) from error
 
 
 def _xml(path: Path) -> object:
@@ -70,7 +71,7 @@ def _xml(path: Path) -> object:
     """
     text = read_text(path, MAX_XML_BYTES)
     if "<!DOCTYPE" in text or "<!ENTITY" in text or "<![CDATA[" in text:
-        raise InputError(f"{path}: XML with a document type, expected plain elements", code="not_xml")
+        raise InputError(f"{path}: XML with a document type, expected plain elements", code=Code.NOT_XML)
     # Each open element: its name, its children, its text.
     stack: list[tuple[str, list[tuple[str, object]], list[str]]] = [("", [], [])]
     end = 0
@@ -79,7 +80,7 @@ def _xml(path: Path) -> object:
         mark = next((m for m in _SKIPPED if text.startswith(m, start)), None)
         stop = text.find(">" if mark is None else _SKIPPED[mark], start)
         if stop < 0:
-            raise InputError(f"{path}: XML that is cut off", code="not_xml")
+            raise InputError(f"{path}: XML that is cut off", code=Code.NOT_XML)
         end = stop + (1 if mark is None else len(_SKIPPED[mark]))
         if mark is not None:
             continue
@@ -89,14 +90,14 @@ def _xml(path: Path) -> object:
         if not closing:
             stack.append((name, [], []))
             if len(stack) > _MAX_DEPTH:
-                raise InputError(f"{path}: more than {_MAX_DEPTH} elements in each other", code="not_xml")
+                raise InputError(f"{path}: more than {_MAX_DEPTH} elements in each other", code=Code.NOT_XML)
         if closing or empty:
             opened, children, words = stack.pop()
             if opened != name or not stack:
-                raise InputError(f"{path}: </{name[:40]}> closes nothing", code="not_xml")
+                raise InputError(f"{path}: </{name[:40]}> closes nothing", code=Code.NOT_XML)
             stack[-1][1].append((name, _element(children, " ".join(words).strip())))
     if len(stack) != 1 or not stack[0][1]:
-        raise InputError(f"{path}: XML that is cut off, or none", code="not_xml")
+        raise InputError(f"{path}: XML that is cut off, or none", code=Code.NOT_XML)
     return stack[0][1][0][1]
 
 

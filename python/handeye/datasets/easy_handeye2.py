@@ -17,6 +17,7 @@ from pathlib import Path
 
 import msgspec
 
+from handeye.codes import Code
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Importer
 from handeye.datasets.plausibility import pose_warnings
@@ -93,7 +94,7 @@ def read(path: Path, options: ImportOptions) -> PosePairs:
     if mounting is None:
         raise InputError(
             f"{path}: the samples do not say where the camera sits; easy_handeye2 leaves it out",
-            code="mounting_unstated",
+            code=Code.MOUNTING_UNSTATED,
             hint="state --mounting eye_in_hand or eye_to_hand; the numbers fit both",
         )
     poses: list[tuple[Pose, Pose]] = []

@@ -10,6 +10,7 @@ import struct
 from pathlib import Path
 from typing import BinaryIO
 
+from handeye.codes import Code
 from handeye.datasets.reading import reason
 from handeye.errors import InputError
 
@@ -41,12 +42,12 @@ def image_size(path: Path) -> tuple[int, int] | None:
     if path.suffix.lower() not in _READERS:
         return None
     if not path.is_file():
-        raise InputError(f"{path}: not a regular file", code="unreadable")
+        raise InputError(f"{path}: not a regular file", code=Code.UNREADABLE)
     try:
         with path.open("rb") as file:
             return size_in(file, path.suffix.lower(), str(path))
     except OSError as error:
-        raise InputError(f"{path}: {reason(error)}", code="unreadable") from error
+        raise InputError(f"{path}: {reason(error)}", code=Code.UNREADABLE) from error
 
 
 def size_in(file: BinaryIO, suffix: str, where: str) -> tuple[int, int]:
@@ -61,12 +62,14 @@ def size_in(file: BinaryIO, suffix: str, where: str) -> tuple[int, int]:
         width, height = _READERS[suffix](file)
     except (EOFError, struct.error) as error:
         raise InputError(
-            f"{where}: the image is truncated", code="truncated_image", hint="copy the file again"
+            f"{where}: the image is truncated", code=Code.TRUNCATED_IMAGE, hint="copy the file again"
         ) from error
     except ValueError as error:
-        raise InputError(f"{where}: {error}", code="not_an_image", hint="check what this file is") from error
+        raise InputError(
+            f"{where}: {error}", code=Code.NOT_AN_IMAGE, hint="check what this file is"
+        ) from error
     if not (0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE):
-        raise InputError(f"{where}: an image of {width} x {height} pixels", code="not_an_image")
+        raise InputError(f"{where}: an image of {width} x {height} pixels", code=Code.NOT_AN_IMAGE)
     return width, height
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from handeye.codes import Code
 from handeye.datasets.image_header import image_size
 from handeye.datasets.images import read_image
 from handeye.datasets.joint_states import Forward
@@ -256,7 +257,7 @@ def common_image_size(folder: Path, shots: Iterable[Shot]) -> tuple[int, int] | 
             raise InputError(
                 f"{folder}: image {shot.image} has {size[0]} x {size[1]} pixels, but {first[0].image} has "
                 f"{first[1][0]} x {first[1][1]}",
-                code="image_size",
+                code=Code.IMAGE_SIZE,
                 hint="a set must come from one camera at one resolution",
             )
     return None if first is None else first[1]

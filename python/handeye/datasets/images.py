@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handeye.codes import Code
 from handeye.datasets.image_header import IMAGE_SUFFIXES, image_size, size_in
 from handeye.datasets.reading import MIB, read_bytes
 from handeye.errors import InputError
@@ -38,7 +39,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     """
     if path.suffix.lower() not in IMAGE_SUFFIXES:
         raise InputError(
-            f"{path}: expected an image ({', '.join(sorted(IMAGE_SUFFIXES))})", code="not_an_image"
+            f"{path}: expected an image ({', '.join(sorted(IMAGE_SUFFIXES))})", code=Code.NOT_AN_IMAGE
         )
     content = read_bytes(path, MAX_BYTES)
     return decoded(content, path.suffix.lower(), str(path), image_size(path) or _tiff_size(content, path))
@@ -69,19 +70,19 @@ def decoded(
     width, height = size or size_in(BytesIO(content), suffix, where)
     if width * height > MAX_PIXELS:
         raise InputError(
-            f"{where}: {width} x {height} pixels, expected at most {MAX_PIXELS}", code="too_large"
+            f"{where}: {width} x {height} pixels, expected at most {MAX_PIXELS}", code=Code.TOO_LARGE
         )
     if width * height > max(ALWAYS_PIXELS, PIXELS_PER_BYTE * len(content)):
         raise InputError(
             f"{where}: {width} x {height} pixels in {len(content)} bytes, which no camera's picture has",
-            code="too_large",
+            code=Code.TOO_LARGE,
             hint="check what this file is",
         )
     scans = content.count(b"\xff\xda") if suffix in {".jpg", ".jpeg"} else 1
     if scans > MAX_SCANS:
         raise InputError(
             f"{where}: a JPEG image of {scans} scans, expected at most {MAX_SCANS}",
-            code="too_large",
+            code=Code.TOO_LARGE,
             hint="save the image again without progressive encoding",
         )
     try:
@@ -109,7 +110,7 @@ def eight_bits(image: NDArray[np.integer[Any] | np.floating[Any]], where: str) -
     if image.dtype != np.uint16:
         raise InputError(
             f"{where}: pixels of {image.dtype}, expected 8 or 16 bits",
-            code="not_an_image",
+            code=Code.NOT_AN_IMAGE,
             hint="save the image with whole grey values",
         )
     bits = max(int(image.max()).bit_length(), 8)
@@ -119,7 +120,9 @@ def eight_bits(image: NDArray[np.integer[Any] | np.floating[Any]], where: str) -
 
 
 def _damaged(where: str, found: str) -> InputError:
-    return InputError(f"{where}: a damaged image: {found}", code="damaged_image", hint="copy the file again")
+    return InputError(
+        f"{where}: a damaged image: {found}", code=Code.DAMAGED_IMAGE, hint="copy the file again"
+    )
 
 
 def _tiff_size(content: bytes, path: Path) -> tuple[int, int]:
@@ -132,7 +135,7 @@ def _tiff_size(content: bytes, path: Path) -> tuple[int, int]:
     """
     order = {b"II*\0": "<", b"MM\0*": ">"}.get(content[:4])
     if order is None:
-        raise InputError(f"{path}: not a TIFF image", code="not_an_image", hint="check what this file is")
+        raise InputError(f"{path}: not a TIFF image", code=Code.NOT_AN_IMAGE, hint="check what this file is")
     sizes: dict[int, int] = {}
     try:
         (start,) = struct.unpack_from(f"{order}I", content, 4)
@@ -144,8 +147,8 @@ def _tiff_size(content: bytes, path: Path) -> tuple[int, int]:
                 (sizes[tag],) = struct.unpack_from(order + ("H" if kind == 3 else "I"), content, at + 8)
     except struct.error as error:
         raise InputError(
-            f"{path}: the image is truncated", code="truncated_image", hint="copy the file again"
+            f"{path}: the image is truncated", code=Code.TRUNCATED_IMAGE, hint="copy the file again"
         ) from error
     if len(sizes) < 2:
-        raise InputError(f"{path}: a TIFF image without size", code="not_an_image")
+        raise InputError(f"{path}: a TIFF image without size", code=Code.NOT_AN_IMAGE)
     return sizes[_TIFF_WIDTH], sizes[_TIFF_HEIGHT]

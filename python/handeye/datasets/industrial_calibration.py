@@ -16,6 +16,7 @@ from pathlib import Path
 
 import msgspec
 
+from handeye.codes import Code
 from handeye.datasets import robot_cal_tools
 from handeye.datasets.image_set import ImageSet, ImportOptions, common_image_size
 from handeye.datasets.importer import Importer
@@ -64,7 +65,7 @@ def read(path: Path, options: ImportOptions) -> ImageSet:
     target, warnings = options.target, ()
     if target is None:
         if document.target_finder is None:
-            raise InputError(f"{file}: target_finder is missing", code="invalid_field")
+            raise InputError(f"{file}: target_finder is missing", code=Code.INVALID_FIELD)
         with located(str(file)):
             target, warnings = robot_cal_tools.target_of(document.target_finder)
     camera = None

@@ -14,6 +14,7 @@ from typing import Protocol, cast
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.documents import SUFFIXES, read_document_file
 from handeye.datasets.pose_rows import PoseRows, Statement
 from handeye.errors import InputError
@@ -59,7 +60,7 @@ def read_joint_rows(path: Path, arm: Forward | None) -> PoseRows | None:
     if arm is None:
         raise InputError(
             f"{path}: joint positions in place of poses",
-            code="unknown_arm",
+            code=Code.UNKNOWN_ARM,
             hint="name the arm or its URDF with --robot",
         )
     names, samples = _list(table, "joint_names", path), _list(table, "joint_values", path)
@@ -67,7 +68,7 @@ def read_joint_rows(path: Path, arm: Forward | None) -> PoseRows | None:
     if missing:
         raise InputError(
             f"{path}: joints {', '.join(map(str, names))[:200]}, expected {', '.join(arm.joint_names)}",
-            code="wrong_arm",
+            code=Code.WRONG_ARM,
             hint="give the description of this robot with --robot",
         )
     values = np.array([_numbers(row, len(names), f"{path}: sample {k}") for k, row in enumerate(samples, 1)])
@@ -86,7 +87,7 @@ def _list(table: Mapping[str, object], key: str, path: Path) -> list[object]:
     items = table[key]
     found = cast("list[object]", items) if isinstance(items, list) else []
     if not 0 < len(found) <= (MAX_JOINTS if key == "joint_names" else MAX_ROWS):
-        raise InputError(f"{path}: {key}: expected a list", code="invalid_field")
+        raise InputError(f"{path}: {key}: expected a list", code=Code.INVALID_FIELD)
     return found
 
 
@@ -95,7 +96,9 @@ def _numbers(row: object, count: int, where: str) -> list[float]:
     try:
         values = [float(cast("str", item)) for item in items]
     except (TypeError, ValueError) as error:
-        raise InputError(f"{where}: {str(error)[:80]}", code="not_numbers") from error
+        raise InputError(f"{where}: {str(error)[:80]}", code=Code.NOT_NUMBERS) from error
     if len(values) != count or not np.isfinite(values).all():
-        raise InputError(f"{where}: {len(values)} values, expected {count} finite ones", code="wrong_shape")
+        raise InputError(
+            f"{where}: {len(values)} values, expected {count} finite ones", code=Code.WRONG_SHAPE
+        )
     return values

@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets import (
     certifiable,
     easy_handeye2,
@@ -93,14 +94,14 @@ def load(
         importer = IMPORTERS.get(layout)
         if importer is None:
             raise InputError(
-                f"layout {layout!r}, expected one of {', '.join(IMPORTERS)}", code="unknown_format"
+                f"layout {layout!r}, expected one of {', '.join(IMPORTERS)}", code=Code.UNKNOWN_FORMAT
             )
         return importer.read(folder, options)
     if is_file(folder / FILE_NAME):
         if options != ImportOptions(arm=arm):
             raise InputError(
                 f"{folder}: a recording says its target, mounting and poses itself",
-                code="options_unused",
+                code=Code.OPTIONS_UNUSED,
                 hint=f"leave the options out, or change {FILE_NAME}",
             )
         return recording_format.read_recording(folder)
@@ -111,7 +112,7 @@ def load(
         raise _not_recognised(folder)
     if len(fitting) > 1:
         names = " and ".join(importer.name for importer in fitting)
-        raise InputError(f"{folder}: looks like {names}", code="ambiguous_format", hint="name the layout")
+        raise InputError(f"{folder}: looks like {names}", code=Code.AMBIGUOUS_FORMAT, hint="name the layout")
     return fitting[0].read(folder, options)
 
 
@@ -128,7 +129,7 @@ def _place(path: str | os.PathLike[str]) -> Path:
         if given.suffix.lower() in _NEVER_LOADED:
             raise InputError(
                 f"{given}: files of this kind are never loaded, as they can run code of their author",
-                code="unknown_format",
+                code=Code.UNKNOWN_FORMAT,
                 hint="give the folder with the text files",
             )
         known = {FILE_NAME, rwhe_calib.POSES_FILE, *robot_cal_tools.LIST_FILES}
@@ -136,7 +137,7 @@ def _place(path: str | os.PathLike[str]) -> Path:
             return given.parent if given.name in known else given
         return existing_folder(given)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{path!r}: not a path ({error})", code="unreadable") from error
+        raise InputError(f"{path!r}: not a path ({error})", code=Code.UNREADABLE) from error
 
 
 def _holds_parquet(folder: Path) -> bool:
@@ -167,5 +168,5 @@ def _not_recognised(folder: Path) -> InputError:
             "Parquet is not read: write its poses as CSV (pandas: to_csv) and its pictures as files beside it"
         )
     return InputError(
-        f"{folder}: nothing that can be read, expected {kinds}", code="unknown_format", hint=hint
+        f"{folder}: nothing that can be read, expected {kinds}", code=Code.UNKNOWN_FORMAT, hint=hint
     )

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import cast
 
+from handeye.codes import Code
 from handeye.datasets.documents import SUFFIXES, read_document_file
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Importer
@@ -51,7 +52,7 @@ def read(path: Path, options: ImportOptions) -> PosePairs:
         pair = _pair(entry)
         with located(f"{path}: sample {index}"):
             if pair is None:
-                raise InputError(f"expected {' and '.join(_KEYS)}", code="invalid_field")
+                raise InputError(f"expected {' and '.join(_KEYS)}", code=Code.INVALID_FIELD)
             poses.append((_pose(pair[0]), _pose(pair[1])))
     pairs = numbered(poses)
     warnings = pose_warnings((pair.name, pair.T_base_flange) for pair in pairs)
@@ -89,9 +90,9 @@ def _pose(item: object) -> Pose:
     try:
         numbers = [float(cast("str", value)) for value in flat]
     except (TypeError, ValueError) as error:
-        raise InputError(f"a matrix with {str(error)[:80]}", code="not_numbers") from error
+        raise InputError(f"a matrix with {str(error)[:80]}", code=Code.NOT_NUMBERS) from error
     if len(numbers) != 16:
-        raise InputError(f"a matrix of {len(numbers)} numbers, expected 16", code="wrong_shape")
+        raise InputError(f"a matrix of {len(numbers)} numbers, expected 16", code=Code.WRONG_SHAPE)
     return NOTATIONS["matrix"].pose(numbers)
 
 

@@ -15,6 +15,7 @@ from typing import Any, cast
 
 import msgspec
 
+from handeye.codes import Code
 from handeye.datasets.reading import MIB, located, read_text
 from handeye.datasets.toml_reading import parse_toml
 from handeye.datasets.yaml_reading import read_yaml
@@ -56,7 +57,7 @@ def _table(file: Path) -> dict[str, Any]:
     if suffix not in {".toml", ".json"}:
         raise InputError(
             f"{file}: a target in a file of this kind, expected .toml, .json or Kalibr's .yaml",
-            code="unknown_format",
+            code=Code.UNKNOWN_FORMAT,
         )
     text = read_text(file, MAX_BYTES)
     if suffix == ".toml":
@@ -65,9 +66,9 @@ def _table(file: Path) -> dict[str, Any]:
         try:
             document = json.loads(text)
         except (ValueError, RecursionError) as error:
-            raise InputError(f"{file}: not JSON: {error}", code="not_json") from error
+            raise InputError(f"{file}: not JSON: {error}", code=Code.NOT_JSON) from error
     if not isinstance(document, Mapping):
-        raise InputError(f"{file}: expected a table with the fields of a target", code="invalid_field")
+        raise InputError(f"{file}: expected a table with the fields of a target", code=Code.INVALID_FIELD)
     table = cast("Mapping[str, Any]", document)
     inner = table.get("target", table)
     return dict(cast("Mapping[str, Any]", inner)) if isinstance(inner, Mapping) else {"target": inner}
@@ -104,7 +105,7 @@ def _kalibr(document: object) -> dict[str, Any]:
         if given.colSpacingMeters != given.rowSpacingMeters:
             raise InputError(
                 f"squares of {given.rowSpacingMeters} m by {given.colSpacingMeters} m, expected equal sides",
-                code="invalid_field",
+                code=Code.INVALID_FIELD,
             )
         return {"family": "chessboard", **_needed(given, wanted)}
     if given.target_type == "circlegrid":
@@ -113,12 +114,12 @@ def _kalibr(document: object) -> dict[str, Any]:
         return {"family": "circle_grid", **fields, "diameter_m": diameter, "asymmetric": given.asymmetricGrid}
     raise InputError(
         f"target_type {given.target_type[:40]!r}, expected aprilgrid, checkerboard or circlegrid",
-        code="unknown_target",
+        code=Code.UNKNOWN_TARGET,
     )
 
 
 def _needed(given: _Kalibr, wanted: Mapping[str, str]) -> dict[str, Any]:
     missing = [theirs for theirs in wanted.values() if getattr(given, theirs) is None]
     if missing:
-        raise InputError(f"{given.target_type}: {missing[0]} is missing", code="invalid_field")
+        raise InputError(f"{given.target_type}: {missing[0]} is missing", code=Code.INVALID_FIELD)
     return {ours: getattr(given, theirs) for ours, theirs in wanted.items()}

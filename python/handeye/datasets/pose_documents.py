@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
+from handeye.codes import Code
 from handeye.datasets.documents import read_document_file
 from handeye.datasets.pose_labels import INDICES, NAMES, TIMES, columns_of, is_accuracy
 from handeye.datasets.pose_rows import POSITION, QUATERNION, ROTATION_VECTOR, PoseRows
@@ -66,13 +67,15 @@ def rows_of_document(document: object, path: Path) -> PoseRows:
     if not found:
         raise InputError(
             f"{path}: no poses in it",
-            code="no_poses",
+            code=Code.NO_POSES,
             hint="write a list of poses, each a list of numbers or a table with an image and a pose",
         )
     labels = found[0][2]
     for index, (_, _, other) in enumerate(found):
         if other != labels:
-            raise InputError(f"{path}: entry {index + 1} has other fields than the first", code="wrong_shape")
+            raise InputError(
+                f"{path}: entry {index + 1} has other fields than the first", code=Code.WRONG_SHAPE
+            )
     rows = [(name, numbers, f"entry {index + 1}") for index, (name, numbers, _) in enumerate(found)]
     return replace(
         rows_of(path, rows, stated, labels), accuracies=tuple(_accuracies(cast("object", document), 0))

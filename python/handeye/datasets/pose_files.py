@@ -4,6 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets.documents import SUFFIXES
 from handeye.datasets.plausibility import DataWarning, pose_warnings
 from handeye.datasets.pose_documents import read_pose_document
@@ -94,7 +95,7 @@ def read_poses(path: str | os.PathLike[str], stated: Statement | None = None) ->
             raise InputError(
                 f"{path}: {rows.places[0]}: {rows.values.shape[1]} numbers, and nothing says how the poses "
                 "are written; expected the header x,y,z,qx,qy,qz,qw, or 16 numbers a line",
-                code="notation_unstated",
+                code=Code.NOTATION_UNSTATED,
                 hint="say it with --notation and --unit; docs/conventions.md has the table of notations",
             )
         reading = Reading(own, said.unit or Unit.M, said.direction or reading.direction)

@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from handeye.codes import Code
 from handeye.datasets.pose_rows import POSITION, QUATERNION, ROTATION_VECTOR
 from handeye.errors import InputError
 from handeye.notations import MAKERS, Unit
@@ -101,7 +102,7 @@ def columns_of(header: Sequence[str]) -> Columns:
     twice = [labels[i] for i in chosen if labels.count(labels[i]) > 1]
     if twice:
         raise InputError(
-            f"columns {', '.join(labels)[:200]}: {twice[0]} is there twice", code="invalid_field"
+            f"columns {', '.join(labels)[:200]}: {twice[0]} is there twice", code=Code.INVALID_FIELD
         )
     return Columns(
         name,
@@ -136,7 +137,7 @@ def _pose_columns(labels: Sequence[str], left: Sequence[int]) -> list[int]:
         raise InputError(
             f"columns {', '.join(labels)[:200]}: expected x, y, z and the rotation (rx, ry, rz; a, b, c; "
             "qx, qy, qz, qw; ...), or a matrix of 12 or 16",
-            code="invalid_field",
+            code=Code.INVALID_FIELD,
             hint="name the columns so, or leave out the header",
         )
     return list(left)

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.camera_files import read_camera
 from handeye.datasets.image_header import IMAGE_SUFFIXES
 from handeye.datasets.image_set import (
@@ -79,7 +80,7 @@ def read(folder: Path, options: ImportOptions) -> ImageSet | UnreadPoses:
     pictures = _pictures(folder)
     if not pictures:
         raise InputError(
-            f"{folder}: no pictures, expected {', '.join(sorted(IMAGE_SUFFIXES))}", code="no_images"
+            f"{folder}: no pictures, expected {', '.join(sorted(IMAGE_SUFFIXES))}", code=Code.NO_IMAGES
         )
     rows, file = _rows(folder, pictures, options)
     chosen, warnings = _matched(folder, pictures, rows)
@@ -142,7 +143,7 @@ def _rows(folder: Path, pictures: Sequence[str], options: ImportOptions) -> tupl
     if not names:
         raise InputError(
             f"{folder}: no file with the robot's poses",
-            code="missing_file",
+            code=Code.MISSING_FILE,
             hint="name it with --poses; CSV, text, JSON and YAML are read",
         )
     if len(names) >= max(3, len(pictures)):
@@ -153,7 +154,7 @@ def _rows(folder: Path, pictures: Sequence[str], options: ImportOptions) -> tupl
         try:
             found[name] = _read_rows(folder / name, options)
         except InputError as error:
-            if error.code in {"unknown_arm", "wrong_arm"}:
+            if error.code in {Code.UNKNOWN_ARM, Code.WRONG_ARM}:
                 raise
             failures.append(error.message)
     if len(found) > 1:
@@ -162,12 +163,12 @@ def _rows(folder: Path, pictures: Sequence[str], options: ImportOptions) -> tupl
     if len(found) > 1:
         raise InputError(
             f"{folder}: {' and '.join(found)} hold poses",
-            code="ambiguous_format",
+            code=Code.AMBIGUOUS_FORMAT,
             hint="name the right one with --poses",
         )
     if not found:
         raise InputError(
-            f"{folder}: no file with the robot's poses: {'; '.join(failures)[:400]}", code="no_poses"
+            f"{folder}: no file with the robot's poses: {'; '.join(failures)[:400]}", code=Code.NO_POSES
         )
     (name, rows), *_ = found.items()
     return rows, name
@@ -185,11 +186,11 @@ def _given(folder: Path, name: str) -> Path:
     if len(paths) == 2 and not here.samefile(inner):
         raise InputError(
             f"--poses {name}: there is one here and one in {folder}",
-            code="ambiguous_format",
+            code=Code.AMBIGUOUS_FORMAT,
             hint=f"write ./{name} or {inner}",
         )
     if not paths:
-        raise InputError(f"{name}: no such file, here or in {folder}", code="missing_file")
+        raise InputError(f"{name}: no such file, here or in {folder}", code=Code.MISSING_FILE)
     return paths[0]
 
 
@@ -212,7 +213,7 @@ def _one_a_file(folder: Path, files: Sequence[Path]) -> PoseRows:
     if len(counts) != 1 or len(parts[0]) != 1:
         raise InputError(
             f"{folder}: {len(files)} files, expected one pose in each, all written the same way",
-            code="counts_differ",
+            code=Code.COUNTS_DIFFER,
             hint="name the file or the folder of poses with --poses",
         )
     first = parts[0]
@@ -237,7 +238,7 @@ def _matched(
     if len(rows) != len(pictures):
         raise InputError(
             f"{rows.file}: {len(rows)} poses for {len(pictures)} pictures in {folder}, expected as many",
-            code="counts_differ",
+            code=Code.COUNTS_DIFFER,
             hint="name the picture of each pose in a column image, or remove what does not belong",
         )
     return list(enumerate(pictures)), []
@@ -306,7 +307,7 @@ def stated_target(folder: Path, options: ImportOptions) -> Target:
     missing = "what the calibration target is" if options.pattern is None else "how large its squares are"
     raise InputError(
         f"{folder}: the files do not say {missing}",
-        code="unknown_target",
+        code=Code.UNKNOWN_TARGET,
         hint="--target FILE for any family (handeye target writes such a file; ChArUco, ArUco, AprilGrid, "
         "circles), or --rows, --columns and --pitch-mm for a chessboard",
     )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.bags.tracks import Track
 from handeye.datasets.plausibility import DataWarning
 from handeye.errors import InputError
@@ -76,9 +77,9 @@ class PosePairs:
 
     def __post_init__(self) -> None:
         if not self.pairs:
-            raise InputError(f"{self.name}: no samples", code="no_poses")
+            raise InputError(f"{self.name}: no samples", code=Code.NO_POSES)
         if len({pair.name for pair in self.pairs}) < len(self.pairs):
-            raise InputError(f"{self.name}: two samples of one name", code="duplicate_view")
+            raise InputError(f"{self.name}: two samples of one name", code=Code.DUPLICATE_VIEW)
 
     def __len__(self) -> int:
         return len(self.pairs)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.reading import located
 from handeye.errors import InputError
 from handeye.notations import EULER, MAKERS, NOTATIONS, PLAIN, Direction, Notation, Unit
@@ -61,7 +62,7 @@ class Statement:
             if mine is not None and theirs is not None and mine != theirs:
                 raise InputError(
                     f"{mine} is stated, but the file says {theirs}",
-                    code="contradiction",
+                    code=Code.CONTRADICTION,
                     hint="leave the option out, or correct the file",
                 )
         return Statement(
@@ -201,7 +202,7 @@ class PoseRows:
             raise InputError(
                 f"{self.file}: {self.places[0]}: {self.values.shape[1]} numbers, expected 6 (position and "
                 "angles), 7 (position and quaternion), 8 (with a time), 12 or 16 (matrix)",
-                code="wrong_shape",
+                code=Code.WRONG_SHAPE,
                 hint="docs/conventions.md has the table of notations",
             )
         units = (said.unit,) if said.unit else (said.notation.unit,) if said.notation else (None,)
@@ -240,7 +241,9 @@ class PoseRows:
             form = notation.form
             rotation = form.rotation if isinstance(form, Vector) else None
             if not isinstance(rotation, Quaternion):
-                raise InputError(f"the columns are a quaternion, not {notation.name}", code="contradiction")
+                raise InputError(
+                    f"the columns are a quaternion, not {notation.name}", code=Code.CONTRADICTION
+                )
             x, y, z, w = range(count - 4, count)
             turn = [w, x, y, z] if rotation.real_first else [x, y, z, w]
             order = [*turn, 0, 1, 2] if isinstance(form, Vector) and form.position_last else [0, 1, 2, *turn]
@@ -251,7 +254,7 @@ class PoseRows:
             expected = " or ".join(map(str, notation.counts))
             raise InputError(
                 f"{self.places[0]}: {count} numbers, expected {expected} in the notation {notation.name}",
-                code="wrong_shape",
+                code=Code.WRONG_SHAPE,
             )
         return values
 

@@ -21,6 +21,7 @@ from typing import cast
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.bags.contents import matrices
 from handeye.datasets.bags.tracks import Track, rising
 from handeye.datasets.image_set import ImportOptions
@@ -58,7 +59,7 @@ def _pair(folder: Path, patterns: tuple[re.Pattern[str], re.Pattern[str]]) -> tu
 def _needed(folder: Path, patterns: tuple[re.Pattern[str], re.Pattern[str]], what: str) -> tuple[Path, Path]:
     pair = _pair(existing_folder(folder), patterns)
     if pair is None:
-        raise InputError(f"{folder}: expected one pair of files, {what}", code="missing_file")
+        raise InputError(f"{folder}: expected one pair of files, {what}", code=Code.MISSING_FILE)
     return folder / pair[0], folder / pair[1]
 
 
@@ -127,7 +128,7 @@ def _named_poses(columns: Sequence[str], table: FloatArray, prefix: str, path: P
     wanted = [f"{prefix}_{part}" for part in _POSE]
     missing = [name for name in wanted if name not in columns]
     if missing:
-        raise InputError(f"{path}: no column {missing[0]}", code="invalid_field")
+        raise InputError(f"{path}: no column {missing[0]}", code=Code.INVALID_FIELD)
     return matrices(tuple(row) for row in table[:, [columns.index(name) for name in wanted]].tolist())
 
 
@@ -135,11 +136,11 @@ def _named(path: Path) -> tuple[list[str], FloatArray]:
     lines = _lines(path)
     columns = [part.strip() for part in lines[0][1].split(",")]
     if len(set(columns)) < len(columns):
-        raise InputError(f"{path}: two columns of one name", code="invalid_field")
+        raise InputError(f"{path}: two columns of one name", code=Code.INVALID_FIELD)
     if "t" not in columns:
-        raise InputError(f"{path}: no column t", code="invalid_field")
+        raise InputError(f"{path}: no column t", code=Code.INVALID_FIELD)
     if len(lines) == 1:
-        raise InputError(f"{path}: no poses in it", code="no_poses")
+        raise InputError(f"{path}: no poses in it", code=Code.NO_POSES)
     return columns, _table(path, lines[1:], len(columns), may_miss=True)
 
 
@@ -152,12 +153,12 @@ def _plain(path: Path) -> Track:
 def _lines(path: Path) -> list[tuple[int, str]]:
     lines = read_text(path, MAX_BYTES).splitlines()
     if len(lines) > MAX_ROWS:
-        raise InputError(f"{path}: {len(lines)} lines, expected at most {MAX_ROWS}", code="too_large")
+        raise InputError(f"{path}: {len(lines)} lines, expected at most {MAX_ROWS}", code=Code.TOO_LARGE)
     kept = [
         (n, line.strip()) for n, line in enumerate(lines, start=1) if line.strip() and line.strip()[0] != "#"
     ]
     if not kept:
-        raise InputError(f"{path}: no poses in it", code="no_poses")
+        raise InputError(f"{path}: no poses in it", code=Code.NO_POSES)
     return kept
 
 
@@ -169,7 +170,7 @@ def _table(path: Path, lines: Sequence[tuple[int, str]], width: int, *, may_miss
             # A comma with a space behind it is one separator, as NumPy writes it.
             words = [word.strip() for word in line.split(",")] if "," in line else line.split()
             if len(words) != width:
-                raise InputError(f"{len(words)} values, expected {width}", code="wrong_shape")
+                raise InputError(f"{len(words)} values, expected {width}", code=Code.WRONG_SHAPE)
             rows.append([_number(word, may_miss=may_miss) for word in words])
     return np.array(rows, dtype=np.float64)
 

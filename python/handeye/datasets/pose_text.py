@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.image_header import IMAGE_SUFFIXES
 from handeye.datasets.pose_labels import columns_of
 from handeye.datasets.pose_rows import PoseRows, Statement
@@ -54,11 +55,11 @@ def read_pose_text_file(path: Path) -> PoseRows:
         if line.strip() and not line.lstrip().startswith(_COMMENT) and not _STATED.match(line)
     ]
     if any(len(line) > MAX_LINE for _, line in lines):
-        raise InputError(f"{path}: a line of more than {MAX_LINE} characters", code="too_large")
+        raise InputError(f"{path}: a line of more than {MAX_LINE} characters", code=Code.TOO_LARGE)
     if len(lines) > MAX_POSES:
-        raise InputError(f"{path}: more than {MAX_POSES} lines", code="too_large")
+        raise InputError(f"{path}: more than {MAX_POSES} lines", code=Code.TOO_LARGE)
     if not lines:
-        raise InputError(f"{path}: no poses in it", code="no_poses")
+        raise InputError(f"{path}: no poses in it", code=Code.NO_POSES)
     header, rows = _table(path, lines)
     if header is not None:
         return _under_header(path, header, rows, stated)
@@ -75,13 +76,13 @@ def rows_of(path: Path, found: Sequence[_Row], stated: Statement, labels: tuple[
         No row, or rows of different length.
     """
     if not found:
-        raise InputError(f"{path}: no poses in it", code="no_poses")
+        raise InputError(f"{path}: no poses in it", code=Code.NO_POSES)
     count = len(found[0][1])
     for _, numbers, place in found:
         if len(numbers) != count:
             raise InputError(
                 f"{path}: {place}: {len(numbers)} values, expected {count} as in {found[0][2]}",
-                code="wrong_shape",
+                code=Code.WRONG_SHAPE,
             )
     values = np.array([numbers for _, numbers, _ in found], dtype=np.float64).reshape(len(found), count)
     names = [name[:MAX_NAME_LENGTH] for name, _, _ in found]
@@ -98,7 +99,7 @@ def _decoded(path: Path) -> str:
     try:
         return content.decode(encoding)
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text (byte {error.start})", code="not_text") from error
+        raise InputError(f"{path}: not UTF-8 text (byte {error.start})", code=Code.NOT_TEXT) from error
 
 
 def _statement(text: str, path: Path) -> Statement:
@@ -152,7 +153,7 @@ def _table(
     if _has_decimal_commas(fields):
         fields = [[f.replace(",", ".") if _DECIMAL_COMMA.fullmatch(f) else f for f in row] for row in fields]
     if len(fields) != len(lines):
-        raise InputError(f"{path}: quotes that do not close", code="invalid_field")
+        raise InputError(f"{path}: quotes that do not close", code=Code.INVALID_FIELD)
     rows = [(place, row) for (place, _), row in zip(lines, fields, strict=True)]
     first = rows[0][1]
     is_header = len(first) >= 6 and not any(re.fullmatch(NUMBER, field, re.ASCII) for field in first)
@@ -174,7 +175,7 @@ def _under_header(
     path: Path, header: list[str], rows: Sequence[tuple[str, list[str]]], stated: Statement
 ) -> PoseRows:
     if not rows:
-        raise InputError(f"{path}: no poses after the header", code="no_poses")
+        raise InputError(f"{path}: no poses after the header", code=Code.NO_POSES)
     try:
         columns = columns_of(header)
     except InputError as error:
@@ -183,7 +184,7 @@ def _under_header(
     for place, fields in rows:
         where = f"{path}: {place}"
         if len(fields) != len(header):
-            raise InputError(f"{where}: {len(fields)} values, expected {len(header)}", code="wrong_shape")
+            raise InputError(f"{where}: {len(fields)} values, expected {len(header)}", code=Code.WRONG_SHAPE)
         name = "" if columns.name is None else fields[columns.name]
         numbers = [
             number(fields[i].strip("[](){}"), f"{where}: {label}")

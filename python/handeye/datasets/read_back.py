@@ -2,6 +2,7 @@
 
 import os
 
+from handeye.codes import Code
 from handeye.datasets.recording_format import read_recording
 from handeye.datasets.rig_format import read_rig
 from handeye.errors import InputError, OutputError
@@ -31,9 +32,9 @@ def check_written(recording: Recording, folder: str | os.PathLike[str]) -> None:
     try:
         back = read_recording(folder).recording
     except InputError as error:
-        raise OutputError(f"{folder}: does not read back: {error.message}", code="not_exact") from error
+        raise OutputError(f"{folder}: does not read back: {error.message}", code=Code.NOT_EXACT) from error
     if _comparable(back) != _comparable(recording):
-        raise OutputError(f"{folder}: does not read back as it was written", code="not_exact")
+        raise OutputError(f"{folder}: does not read back as it was written", code=Code.NOT_EXACT)
 
 
 def _comparable(recording: Recording) -> tuple[object, ...]:
@@ -68,9 +69,9 @@ def check_written_rig(recording: RigRecording, folder: str | os.PathLike[str]) -
     try:
         back = read_rig(folder).recording
     except InputError as error:
-        raise OutputError(f"{folder}: does not read back: {error.message}", code="not_exact") from error
+        raise OutputError(f"{folder}: does not read back: {error.message}", code=Code.NOT_EXACT) from error
     if _comparable_rig(back) != _comparable_rig(recording):
-        raise OutputError(f"{folder}: does not read back as it was written", code="not_exact")
+        raise OutputError(f"{folder}: does not read back as it was written", code=Code.NOT_EXACT)
 
 
 def _comparable_rig(recording: RigRecording) -> tuple[object, ...]:

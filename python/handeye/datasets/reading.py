@@ -12,6 +12,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.errors import HandeyeError, InputError
 from handeye.types.view import check_relative_path
 
@@ -47,9 +48,9 @@ def existing_folder(path: str | os.PathLike[str]) -> Path:
         folder = Path(path)
         if not folder.is_dir():
             found = "is not a folder" if folder.exists() else "no such folder"
-            raise InputError(f"{folder}: {found}", code="missing_file")
+            raise InputError(f"{folder}: {found}", code=Code.MISSING_FILE)
     except (OSError, ValueError) as error:
-        raise InputError(f"{str(path)[:200]!r}: cannot be read ({error})", code="unreadable") from error
+        raise InputError(f"{str(path)[:200]!r}: cannot be read ({error})", code=Code.UNREADABLE) from error
     return folder
 
 
@@ -74,11 +75,11 @@ def file_names(folder: Path) -> list[str]:
         with os.scandir(folder) as entries:
             for number, entry in enumerate(entries):
                 if number >= MAX_FOLDER_ENTRIES:
-                    raise InputError(f"{folder}: more than {MAX_FOLDER_ENTRIES} entries", code="too_large")
+                    raise InputError(f"{folder}: more than {MAX_FOLDER_ENTRIES} entries", code=Code.TOO_LARGE)
                 if not entry.name.startswith(".") and entry.is_file():
                     names.append(entry.name)
     except OSError as error:
-        raise InputError(f"{folder}: {reason(error)}", code="unreadable") from error
+        raise InputError(f"{folder}: {reason(error)}", code=Code.UNREADABLE) from error
     return sorted(names, key=_counting_order)
 
 
@@ -95,7 +96,7 @@ def folder_names(folder: Path) -> list[str]:
             listed = itertools.islice(entries, MAX_FOLDER_ENTRIES)
             names = [entry.name for entry in listed if not entry.name.startswith(".") and entry.is_dir()]
     except OSError as error:
-        raise InputError(f"{folder}: {reason(error)}", code="unreadable") from error
+        raise InputError(f"{folder}: {reason(error)}", code=Code.UNREADABLE) from error
     return sorted(names, key=_counting_order)
 
 
@@ -113,14 +114,14 @@ def inside(folder: Path, relative: str, what: str) -> Path:
         path = (folder / relative).resolve(strict=True)
     except FileNotFoundError as error:
         raise InputError(
-            f"{what}: {relative} is missing in {folder}", code="missing_file", hint="put the file back"
+            f"{what}: {relative} is missing in {folder}", code=Code.MISSING_FILE, hint="put the file back"
         ) from error
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: links in a circle
-        raise InputError(f"{what}: {relative} cannot be read ({error})", code="unreadable") from error
+        raise InputError(f"{what}: {relative} cannot be read ({error})", code=Code.UNREADABLE) from error
     if not path.is_relative_to(root):
         raise InputError(
             f"{what}: {relative} is a link out of {folder}",
-            code="path_outside",
+            code=Code.PATH_OUTSIDE,
             hint="replace the link by the file itself",
         )
     return path
@@ -137,23 +138,25 @@ def read_bytes(path: Path, limit: int) -> bytes:
     try:
         descriptor = os.open(path, _OPEN_FLAGS)
     except (OSError, ValueError) as error:
-        code = "missing_file" if isinstance(error, FileNotFoundError) else "unreadable"
+        code = Code.MISSING_FILE if isinstance(error, FileNotFoundError) else Code.UNREADABLE
         raise InputError(f"{path}: {reason(error)}", code=code) from error
     try:
         with os.fdopen(descriptor, "rb") as file:
             status = os.fstat(descriptor)
             if not stat.S_ISREG(status.st_mode):
-                raise InputError(f"{path}: not a regular file", code="unreadable")
+                raise InputError(f"{path}: not a regular file", code=Code.UNREADABLE)
             # Reading reserves as much memory as is asked for: the size of the file, and one byte more, as
             # it may grow while it is read.
             content = file.read(status.st_size + 1) if status.st_size <= limit else b""
             if len(content) > status.st_size:
                 content += file.read(limit + 1 - len(content))
     except OSError as error:
-        raise InputError(f"{path}: {reason(error)}", code="unreadable") from error
+        raise InputError(f"{path}: {reason(error)}", code=Code.UNREADABLE) from error
     if status.st_size > limit or len(content) > limit:
         raise InputError(
-            f"{path}: {status.st_size} bytes, expected at most {limit}", code="too_large", hint="wrong file?"
+            f"{path}: {status.st_size} bytes, expected at most {limit}",
+            code=Code.TOO_LARGE,
+            hint="wrong file?",
         )
     return content
 
@@ -169,7 +172,7 @@ def read_text(path: Path, limit: int) -> str:
     try:
         return read_bytes(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text (byte {error.start})", code="not_text") from error
+        raise InputError(f"{path}: not UTF-8 text (byte {error.start})", code=Code.NOT_TEXT) from error
 
 
 def number(text: str, where: str) -> float:
@@ -185,7 +188,9 @@ def number(text: str, where: str) -> float:
     if value is None or value in {float("inf"), float("-inf")}:
         raise InputError(
             f"{where}: {text[:40]!r}, expected a finite number",
-            code="not_finite" if text.lower().strip("+-") in {"nan", "inf", "infinity"} else "not_numbers",
+            code=Code.NOT_FINITE
+            if text.lower().strip("+-") in {"nan", "inf", "infinity"}
+            else Code.NOT_NUMBERS,
             hint="remove the line or repair it",
         )
     return value

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from handeye.codes import Code
 from handeye.datasets.corners import read_corners
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning, recording_warnings
@@ -107,7 +108,7 @@ def read_recording(folder: str | os.PathLike[str]) -> LoadedRecording:
         if document.view_count not in {None, len(document.view)}:
             raise InputError(
                 f"{len(document.view)} views, but view_count is {document.view_count}",
-                code="truncated",
+                code=Code.TRUNCATED,
                 hint="the file may have been cut off; if it was edited on purpose, correct view_count",
             )
         camera = Camera.from_dict(document.camera)
@@ -167,7 +168,7 @@ def read_recording_document(file: Path) -> RecordingDocument:
     if data["version"] != VERSION:
         raise InputError(
             f"{file}: several cameras or targets, expected one of each",
-            code="several_cameras",
+            code=Code.SEVERAL_CAMERAS,
             hint="handeye solve takes them together",
         )
     return read_document(data, RecordingDocument, str(file))
@@ -194,7 +195,7 @@ def _read_view(document: ViewDocument, root: Path, camera: Camera) -> View:
             raise InputError(
                 f"{where}: image {view.image} has {size[0]} x {size[1]} pixels, the camera "
                 f"{camera.width_px} x {camera.height_px}",
-                code="image_size",
+                code=Code.IMAGE_SIZE,
                 hint="the camera must be calibrated at the size of the images",
             )
     return view
@@ -204,7 +205,7 @@ def _read_truth(table: dict[str, Rows], mounting: Mounting) -> Truth:
     names = (mounting.x_name, mounting.y_name)
     for name in table:
         if name not in names:
-            raise InputError(f"truth: {name[:60]!r}, expected {' or '.join(names)}", code="invalid_field")
+            raise InputError(f"truth: {name[:60]!r}, expected {' or '.join(names)}", code=Code.INVALID_FIELD)
     poses: list[Pose | None] = []
     for name in names:
         with located(f"truth: {name}"):

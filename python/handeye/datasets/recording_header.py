@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from handeye.codes import Code
 from handeye.datasets.reading import MIB, read_text
 from handeye.datasets.toml_reading import parse_toml
 from handeye.errors import InputError
@@ -26,18 +27,18 @@ def read_versioned(file: Path) -> dict[str, Any]:
     data = parse_toml(read_text(file, MAX_BYTES), file)
     if data.get("format") != FORMAT:
         raise InputError(
-            f"{file}: format {str(data.get('format'))[:60]!r}, expected {FORMAT!r}", code="unknown_format"
+            f"{file}: format {str(data.get('format'))[:60]!r}, expected {FORMAT!r}", code=Code.UNKNOWN_FORMAT
         )
     version = data.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
         raise InputError(
             f"{file}: version {str(version)[:60]!r}, expected {VERSION} or {RIG_VERSION}",
-            code="invalid_field",
+            code=Code.INVALID_FIELD,
         )
     if version > RIG_VERSION:
         raise InputError(
             f"{file}: version {version}, this program reads up to {RIG_VERSION}",
-            code="newer_version",
+            code=Code.NEWER_VERSION,
             hint="update handeye, or write the recording with the older version",
         )
     return data

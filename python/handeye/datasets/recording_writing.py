@@ -6,6 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from handeye.codes import Code
 from handeye.datasets.corners import corners_text
 from handeye.datasets.reading import inside, is_file, read_text
 from handeye.datasets.recording_format import read_recording_document
@@ -136,7 +137,7 @@ class RecordingFolder:
         except InputError as error:
             raise OutputError(
                 f"{self._folder}: not replaced, as it holds no recording that can be read: {error}",
-                code="exists",
+                code=Code.EXISTS,
             ) from error
         return {view.name: view.corners for view in document.view}
 
@@ -242,7 +243,7 @@ def keep_image(view: View, folder: Path, images_from: Path | None, stem: str) ->
         if source.is_relative_to(folder.resolve()):
             return view.image
     except (InputError, OSError) as error:
-        raise OutputError(f"{folder}: {error}", code="missing_file") from error
+        raise OutputError(f"{folder}: {error}", code=Code.MISSING_FILE) from error
     name = _free_name(folder, "images", stem, source.suffix.lower())
     try:
         (folder / "images").mkdir(exist_ok=True)

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from handeye.codes import Code
 from handeye.datasets.corners import read_corners
 from handeye.datasets.image_header import image_size
 from handeye.datasets.plausibility import DataWarning, recording_warnings
@@ -115,7 +116,7 @@ def read_rig(folder: str | os.PathLike[str]) -> LoadedRig:
         if document.station_count not in {None, len(document.station)}:
             raise InputError(
                 f"{len(document.station)} stations, but station_count is {document.station_count}",
-                code="truncated",
+                code=Code.TRUNCATED,
                 hint="the file may have been cut off; if it was edited on purpose, correct station_count",
             )
         empty = _header(document)
@@ -192,10 +193,10 @@ def _named(tables: list[dict[str, Any]], what: str) -> list[tuple[str, Body, dic
         rest = dict(table)
         name, on = rest.pop("name", None), rest.pop("on", None)
         if not isinstance(name, str) or name in {other for other, _, _ in found}:
-            raise InputError(f"{what} {number}: expected a name of its own", code="invalid_field")
+            raise InputError(f"{what} {number}: expected a name of its own", code=Code.INVALID_FIELD)
         if on not in set(Body):
             raise InputError(
-                f"{what} {name[:60]!r}: on {str(on)[:60]!r}, expected flange or base", code="invalid_field"
+                f"{what} {name[:60]!r}: on {str(on)[:60]!r}, expected flange or base", code=Code.INVALID_FIELD
             )
         found.append((name, Body(on), rest))
     return found
@@ -220,7 +221,9 @@ def _stations(
     views: dict[str, list[_ViewDocument]] = {station.name: [] for station in document.station}
     for one in document.view:
         if one.station not in views:
-            raise InputError(f"view of {one.station[:60]!r}: no such station or camera", code="invalid_field")
+            raise InputError(
+                f"view of {one.station[:60]!r}: no such station or camera", code=Code.INVALID_FIELD
+            )
         views[one.station].append(one)
     return tuple(_station(station, views[station.name], cameras, root) for station in document.station)
 
@@ -234,7 +237,7 @@ def _station(
     for one in seen:
         where = f"station {station.name[:60]}, camera {one.camera[:60]}"
         if one.camera not in cameras:
-            raise InputError(f"{where}: no such station or camera", code="invalid_field")
+            raise InputError(f"{where}: no such station or camera", code=Code.INVALID_FIELD)
         ids, pixels, sigmas = read_corners(inside(root, one.corners, f"{where}: corners"))
         view = View(
             station.name,
@@ -253,14 +256,14 @@ def _station(
                 raise InputError(
                     f"{where}: image {view.image} has {size[0]} x {size[1]} pixels, the camera "
                     f"{expected[0]} x {expected[1]}",
-                    code="image_size",
+                    code=Code.IMAGE_SIZE,
                     hint="the camera must be calibrated at the size of the images",
                 )
         views.append(CameraView(one.camera, one.target, view))
     if not views:
         raise InputError(
             f"station {station.name[:60]}: no camera saw a target",
-            code="no_points",
+            code=Code.NO_POINTS,
             hint="leave the station out",
         )
     return Station(tuple(views))
@@ -284,7 +287,7 @@ def _truth(
                     continue
                 if table.name not in known or known[table.name].body is not body:
                     raise InputError(
-                        f"truth: no {what} {table.name[:60]!r} on the {body.value}", code="invalid_field"
+                        f"truth: no {what} {table.name[:60]!r} on the {body.value}", code=Code.INVALID_FIELD
                     )
                 with located(f"truth of {table.name}"):
                     poses[table.name] = Pose(rows)

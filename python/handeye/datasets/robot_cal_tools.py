@@ -18,6 +18,7 @@ from typing import Any
 
 import msgspec
 
+from handeye.codes import Code
 from handeye.datasets.image_set import ImageSet, ImportOptions, Shot, common_image_size
 from handeye.datasets.importer import Importer
 from handeye.datasets.plausibility import DataWarning, camera_warnings, pose_warnings, target_warnings
@@ -106,7 +107,7 @@ def read(folder: Path, options: ImportOptions) -> ImageSet:
     """
     listed = _list_file(folder)
     if listed is None:
-        raise InputError(f"{folder}: {LIST_FILES[0]} is missing", code="missing_file")
+        raise InputError(f"{folder}: {LIST_FILES[0]} is missing", code=Code.MISSING_FILE)
     file = folder / listed
     entries = read_document(read_yaml(file), list[Entry], str(file), lax=True)
     shots = shots_of(entries, file)
@@ -137,7 +138,7 @@ def shots_of(entries: list[Entry], file: Path) -> tuple[Shot, ...]:
         Too many, or a file of a pose that is missing, leaves the folder, or is no pose.
     """
     if len(entries) > MAX_SHOTS:
-        raise InputError(f"{file}: {len(entries)} entries, expected at most {MAX_SHOTS}", code="too_large")
+        raise InputError(f"{file}: {len(entries)} entries, expected at most {MAX_SHOTS}", code=Code.TOO_LARGE)
     return tuple(_shot(entry, name, file) for entry, name in zip(entries, _names(entries), strict=True))
 
 
@@ -212,14 +213,14 @@ def target_of(finder: Finder) -> tuple[Target, tuple[DataWarning, ...]]:
         return board, ()
     raise InputError(
         f"target_finder: type {finder.type[:80]!r}, expected a modified circle grid or a ChArUco board",
-        code="unknown_target",
+        code=Code.UNKNOWN_TARGET,
         hint="give the target yourself",
     )
 
 
 def _needed(value: Any, field: str) -> Any:  # noqa: ANN401 - what is there is returned as it is
     if value is None:
-        raise InputError(f"target_finder: {field} is missing", code="invalid_field")
+        raise InputError(f"target_finder: {field} is missing", code=Code.INVALID_FIELD)
     return value
 
 

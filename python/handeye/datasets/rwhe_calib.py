@@ -14,6 +14,7 @@ The number of corners is not in the files: it is known here for the published se
 import re
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets.image_header import IMAGE_SUFFIXES
 from handeye.datasets.image_set import ImageSet, ImportOptions, Shot, common_image_size
 from handeye.datasets.importer import Importer
@@ -61,7 +62,7 @@ def read(folder: Path, options: ImportOptions) -> ImageSet:
     if len(poses) != len(images):
         raise InputError(
             f"{folder}: {len(poses)} poses in {POSES_FILE} but {len(images)} images, expected as many",
-            code="counts_differ",
+            code=Code.COUNTS_DIFFER,
             hint="each line of the poses belongs to one image, in the order of the names",
         )
     shots = _shots(folder, images, poses)
@@ -102,7 +103,7 @@ def read_poses(path: Path) -> list[Pose]:
             continue
         if len(fields) != 16:
             raise InputError(
-                f"{where}: {len(fields)} numbers, expected 16 (a 4 x 4 matrix by rows)", code="wrong_shape"
+                f"{where}: {len(fields)} numbers, expected 16 (a 4 x 4 matrix by rows)", code=Code.WRONG_SHAPE
             )
         values = [number(field, where) for field in fields]
         with located(where):
@@ -123,7 +124,7 @@ def read_hand_to_eye(path: Path) -> Pose:
     _, found, rest = read_text(path, MIB).partition("hand2eye")
     fields = rest.lstrip(" \t=:").split()[:16]
     if not found or len(fields) < 16:
-        raise InputError(f"{path}: expected 'hand2eye =' and a 4 x 4 matrix", code="invalid_field")
+        raise InputError(f"{path}: expected 'hand2eye =' and a 4 x 4 matrix", code=Code.INVALID_FIELD)
     where = f"{path}: hand2eye"
     values = [number(field, where) for field in fields]
     with located(where):
@@ -144,11 +145,11 @@ def read_square_size(path: Path) -> float:
     if not lengths or min(lengths) <= 0:
         raise InputError(
             f"{path}: {text[:40]!r}, expected a length with its unit (mm, cm or m)",
-            code="invalid_field",
+            code=Code.INVALID_FIELD,
             hint=hint,
         )
     if max(lengths) > min(lengths) * (1 + 1e-9):
-        raise InputError(f"{path}: {text[:40]!r} contradicts itself", code="invalid_field", hint=hint)
+        raise InputError(f"{path}: {text[:40]!r} contradicts itself", code=Code.INVALID_FIELD, hint=hint)
     return lengths[0]
 
 
@@ -158,7 +159,7 @@ def _shots(folder: Path, images: list[str], poses: list[Pose]) -> tuple[Shot, ..
         name = re.sub(r"[^A-Za-z0-9_.-]", "_", Path(image).stem)
         if name.lower() in shots:
             raise InputError(
-                f"{folder}: {image} and {shots[name.lower()].image} have one name", code="duplicate_view"
+                f"{folder}: {image} and {shots[name.lower()].image} have one name", code=Code.DUPLICATE_VIEW
             )
         with located(str(folder)):
             shots[name.lower()] = Shot(name, image, pose)
@@ -169,7 +170,7 @@ def _square_size(folder: Path) -> float | None:
     files = [name for name in file_names(folder) if _SQUARE_SIZE_FILE.fullmatch(name)]
     sizes = {name: read_square_size(folder / name) for name in files}
     if len(set(sizes.values())) > 1:
-        raise InputError(f"{folder}: {' and '.join(sizes)} contradict each other", code="invalid_field")
+        raise InputError(f"{folder}: {' and '.join(sizes)} contradict each other", code=Code.INVALID_FIELD)
     return next(iter(sizes.values()), None)
 
 
@@ -190,14 +191,14 @@ def _target(
     if pattern is None:
         raise InputError(
             f"{folder}: the number of corners of the chessboard is not in the files",
-            code="pattern_unknown",
+            code=Code.PATTERN_UNKNOWN,
             hint="give --rows and --columns of inner corners, or --target FILE for any other board: "
             "ChArUco, AprilGrid, ArUco markers, circles; handeye target writes such a file",
         )
     if square_m is None:
         raise InputError(
             f"{folder}: the size of the squares is not in the files, expected squaresize.txt",
-            code="missing_file",
+            code=Code.MISSING_FILE,
             hint="write a file squaresize.txt with for example 15mm",
         )
     return Chessboard(*pattern, square_m), ()

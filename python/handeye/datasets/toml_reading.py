@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from handeye.codes import Code
 from handeye.datasets.toml_text import toml_values
 from handeye.errors import InputError
 
@@ -20,6 +21,6 @@ def parse_toml(text: str, file: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise InputError(
             f"{file}: not TOML: {str(error)[:200]}",
-            code="not_toml",
+            code=Code.NOT_TOML,
             hint="repair the line, or write the file again",
         ) from error

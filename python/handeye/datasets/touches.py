@@ -24,6 +24,7 @@ Unknown fields are errors.
 import math
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets.reading import located, read_text
 from handeye.datasets.toml_reading import parse_toml
 from handeye.errors import InputError
@@ -75,11 +76,11 @@ def read_touches(file: Path) -> Probing:
     with located(str(file)):
         document = read_document(values, _TouchesDocument, "touches")
         if len(document.touch) > MAX_TOUCHES:
-            raise InputError(f"{len(document.touch)} touches, at most {MAX_TOUCHES}", code="too_large")
+            raise InputError(f"{len(document.touch)} touches, at most {MAX_TOUCHES}", code=Code.TOO_LARGE)
         tips: dict[str, Tip] = {}
         for tip in document.tip:
             if tip.name in tips:
-                raise InputError(f"two tips named {tip.name[:80]!r}", code="duplicate_value")
+                raise InputError(f"two tips named {tip.name[:80]!r}", code=Code.DUPLICATE_VALUE)
             tips[tip.name] = _tip(tip)
         touches = tuple(_touch(touch, number, document) for number, touch in enumerate(document.touch, 1))
         return Probing(tips, touches, document.sigma_mm / MM_PER_M)
@@ -91,7 +92,7 @@ def _tip(tip: _TipDocument) -> Tip:
     if tip.at_mm is None or tip.sigma_mm is None:
         raise InputError(
             f"tip {tip.name[:80]}: at_mm and sigma_mm go together",
-            code="invalid_field",
+            code=Code.INVALID_FIELD,
             hint="say where it is believed to be and how well (0 for exact), or leave both out",
         )
     x, y, z = (value / MM_PER_M for value in tip.at_mm)
@@ -100,16 +101,16 @@ def _tip(tip: _TipDocument) -> Tip:
 
 def _touch(touch: _TouchDocument, number: int, document: _TouchesDocument) -> Touch:
     if (touch.pose is None) == (touch.T_base_flange is None):
-        raise InputError(f"touch {number}: pose or T_base_flange, one is needed", code="invalid_field")
+        raise InputError(f"touch {number}: pose or T_base_flange, one is needed", code=Code.INVALID_FIELD)
     if touch.joints_deg is not None and touch.joints_rad is not None:
-        raise InputError(f"touch {number}: joints_deg and joints_rad, one is enough", code="invalid_field")
+        raise InputError(f"touch {number}: joints_deg and joints_rad, one is enough", code=Code.INVALID_FIELD)
     with located(f"touch {number}"):
         if touch.T_base_flange is not None:
             pose = Pose(touch.T_base_flange)
         elif document.notation is None:
             raise InputError(
                 "a pose as text, and the file states no notation",
-                code="notation_unstated",
+                code=Code.NOTATION_UNSTATED,
                 hint='add a line such as notation = "ur" at the top',
             )
         else:

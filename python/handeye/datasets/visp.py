@@ -12,6 +12,7 @@ pictures are read as any pictures with one file of poses each.
 import re
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets.image_set import ImportOptions
 from handeye.datasets.importer import Importer
 from handeye.datasets.plausibility import pose_warnings
@@ -73,7 +74,7 @@ def _files(folder: Path) -> tuple[dict[int, str], dict[int, str]]:
 def _pose(path: Path) -> Pose:
     rows = read_pose_rows(path)
     if len(rows) != 1:
-        raise InputError(f"{path}: {len(rows)} poses, expected one", code="wrong_shape")
+        raise InputError(f"{path}: {len(rows)} poses, expected one", code=Code.WRONG_SHAPE)
     return rows.poses(_READING)[0]
 
 

@@ -13,6 +13,7 @@ from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets.reading import reason
 from handeye.errors import OutputError
 
@@ -34,7 +35,7 @@ def new_folder(folder: Path) -> Generator[Path]:
             raise OutputError(f"{folder}: the folder {folder.parent} does not exist", hint="create it first")
         if is_occupied(folder):
             raise OutputError(
-                f"{folder}: exists already and is not empty", code="exists", hint="choose another name"
+                f"{folder}: exists already and is not empty", code=Code.EXISTS, hint="choose another name"
             )
         partial = _beside(folder)
         partial.mkdir()

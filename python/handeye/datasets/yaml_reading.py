@@ -13,6 +13,7 @@ from typing import cast
 
 import yaml
 
+from handeye.codes import Code
 from handeye.datasets.reading import MIB, read_text
 from handeye.errors import InputError
 
@@ -33,7 +34,7 @@ def read_yaml(path: Path) -> object:
     """
     documents = yaml_documents(read_text(path, MAX_BYTES), str(path))
     if len(documents) > 1:
-        raise InputError(f"{path}: {len(documents)} documents, expected one", code="not_yaml")
+        raise InputError(f"{path}: {len(documents)} documents, expected one", code=Code.NOT_YAML)
     return documents[0] if documents else None
 
 
@@ -46,12 +47,14 @@ def yaml_documents(text: str, where: str) -> list[object]:
         Not such YAML, or too long.
     """
     if len(text) > MAX_BYTES:
-        raise InputError(f"{where}: {len(text)} characters, expected at most {MAX_BYTES}", code="too_large")
+        raise InputError(
+            f"{where}: {len(text)} characters, expected at most {MAX_BYTES}", code=Code.TOO_LARGE
+        )
     try:
         roots = cast("Iterable[yaml.Node | None]", yaml.compose_all(text, Loader=yaml.BaseLoader))  # pyright: ignore[reportUnknownMemberType]
         return [_plain(root, set()) for root in itertools.islice(roots, MAX_DOCUMENTS)]
     except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise InputError(f"{where}: not YAML as expected: {error}", code="not_yaml") from error
+        raise InputError(f"{where}: not YAML as expected: {error}", code=Code.NOT_YAML) from error
 
 
 def _plain(node: yaml.Node | None, seen: set[int]) -> object:

@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from handeye.codes import Code
 from handeye.errors import DetectionError, InputError
 from handeye.types import Target
 from handeye.types.arrays import FloatArray, IndexArray, deviations, finite_array, index_array
@@ -63,7 +64,7 @@ class Detection:
             raise InputError(
                 f"detection: {len(ids)} point ids for {len(values)} pixels, expected as many, at least one, "
                 "and none twice",
-                code="wrong_shape",
+                code=Code.WRONG_SHAPE,
             )
         object.__setattr__(self, "point_ids", ids)
         object.__setattr__(self, "pixels", values)

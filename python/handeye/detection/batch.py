@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.detection.base import Detection, Image, NotFound
 from handeye.detection.detect import VERSION, detect
 from handeye.errors import DetectionError, HandeyeError
@@ -81,7 +82,7 @@ class Batch:
             example = "" if error is None else f"; {name}: {error.message.removeprefix(f'{name}: ')}"
             raise DetectionError(
                 f"the target was found in none of {len(self.failed)} images{example}",
-                code="not_detected",
+                code=Code.NOT_DETECTED,
                 hint=None if error is None else error.hint,
             ) from error
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import DegenerateError, SolveError
 from handeye.types.arrays import FloatArray
 from handeye.types.pose import through_twist
@@ -98,7 +99,7 @@ class Bundle:
         """
         residuals = self.residuals()
         if residuals is None:
-            raise DegenerateError("a point is out of the lens's sight", code="camera_not_determined")
+            raise DegenerateError("a point is out of the lens's sight", code=Code.CAMERA_NOT_DETERMINED)
         information, _ = self.normal_equations(residuals).without_poses(0.0)
         scale = 1 / np.sqrt(np.diag(information))
         try:
@@ -106,7 +107,7 @@ class Bundle:
         except np.linalg.LinAlgError as error:
             raise DegenerateError(
                 "the views do not determine all parameters of the lens",
-                code="camera_not_determined",
+                code=Code.CAMERA_NOT_DETERMINED,
                 hint="take more views, tilted, with the board also near the image's edges; or a simpler lens",
             ) from error
         root = np.linalg.solve(factor, np.diag(scale))
@@ -196,7 +197,7 @@ def minimise(bundle: Bundle) -> tuple[Bundle, bool]:
     """
     residuals = bundle.residuals()
     if residuals is None:
-        raise SolveError("camera calibration: a point is out of sight of the first guess", code="diverged")
+        raise SolveError("camera calibration: a point is out of sight of the first guess", code=Code.DIVERGED)
     cost, damping = bundle.cost(residuals), 1e-3
     for _ in range(MAX_ITERATIONS):
         equations = bundle.normal_equations(residuals)

@@ -7,6 +7,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from handeye.codes import Code
 from handeye.detection import charuco, chessboard, circle_grid, tags
 from handeye.detection.base import Detection, Image, NotFound, Reason, upright
 from handeye.detection.description import explained
@@ -76,11 +77,11 @@ def detect(image: Image, target: Target, *, predicted: Prediction | None = None)
     """
     kind = next((kind for kind in KINDS if isinstance(target, kind.targets)), None)
     if kind is None:
-        raise InputError(f"target: no detector for the family {target.family}", code="unknown_target")
+        raise InputError(f"target: no detector for the family {target.family}", code=Code.UNKNOWN_TARGET)
     if image.ndim != 2 or image.dtype != np.uint8:
         raise InputError(
             f"image: shape {image.shape} of {image.dtype}, expected grey values (height, width) of uint8",
-            code="wrong_shape",
+            code=Code.WRONG_SHAPE,
             hint="read it with handeye.datasets.images.read_image, or convert it to grey",
         )
     if min(image.shape) < SMALLEST_SIDE_PX:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.detection.base import Detection
 from handeye.detection.bundle import Bundle, ParameterPrior, minimise
 from handeye.errors import DegenerateError, HandeyeError, InputError, SolveError
@@ -118,7 +119,7 @@ def calibrate_camera(
     'pinhole'
     """
     if lens is not None and lens not in LENSES:
-        raise InputError(f"lens {lens!r}, expected one of {', '.join(LENSES)}", code="unknown_lens")
+        raise InputError(f"lens {lens!r}, expected one of {', '.join(LENSES)}", code=Code.UNKNOWN_LENS)
     rejected = {
         name: f"{len(found)} points, at least {MIN_POINTS} are needed"
         for name, found in detections.items()
@@ -160,7 +161,7 @@ def calibrate_camera(
             if not converged:
                 raise SolveError(
                     f"camera calibration: no convergence with the lens {candidate}",
-                    code="not_converged",
+                    code=Code.NOT_CONVERGED,
                     hint="take more views, or a lens with fewer parameters",
                 )
         except HandeyeError as error:
@@ -204,7 +205,7 @@ def _calibration(
     if freedom <= 0:
         raise DegenerateError(
             f"{residuals.size} measurements for {residuals.size - freedom} unknowns: take more views",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
         )
     sigma = float(np.sqrt(squared.sum() / freedom))
     covariance = best.parameter_covariance() * sigma**2
@@ -224,7 +225,7 @@ def _check_number(usable: Mapping[str, Detection]) -> None:
     if len(usable) < MIN_VIEWS:
         raise InputError(
             f"{len(usable)} views with at least {MIN_POINTS} points, expected {MIN_VIEWS} or more",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
             hint="take more images of the board, tilted in different directions",
         )
 
@@ -236,7 +237,7 @@ def _check_determined(lens: str, covariance: FloatArray, size_px: tuple[int, int
         name = LENSES[lens][worst]
         raise DegenerateError(
             f"the views do not determine {name}: its deviation is {sigma[worst]:.0%} of the image width",
-            code="camera_not_determined",
+            code=Code.CAMERA_NOT_DETERMINED,
             hint="tilt the board by 30 to 50 degrees, in different directions",
         )
 
@@ -259,7 +260,7 @@ def _start(
     if not np.isfinite(least):
         raise DegenerateError(
             "no view of the target looks like that of a flat board",
-            code="camera_not_determined",
+            code=Code.CAMERA_NOT_DETERMINED,
             hint="check rows, columns and pitch of the target",
         )
     return best

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from handeye.codes import Code
 from handeye.detection.base import Image
 from handeye.detection.registration import Aligned, aligned
 from handeye.errors import InputError
@@ -48,7 +49,7 @@ class Prediction:
             raise InputError(
                 f"prediction: pixels of shape {places.shape} and a margin of {margin_px} px, expected (P, 2) "
                 "and at least zero",
-                code="wrong_shape",
+                code=Code.WRONG_SHAPE,
             )
         places[~np.isfinite(places).all(axis=1)] = np.nan
         places.flags.writeable = False
@@ -67,7 +68,7 @@ def where_expected(image: Image, target: Target, prediction: Prediction) -> Alig
     if len(prediction.pixels) != target.point_count:
         raise InputError(
             f"prediction: {len(prediction.pixels)} pixels for {target.point_count} points of the target",
-            code="wrong_shape",
+            code=Code.WRONG_SHAPE,
         )
     seen = np.isfinite(prediction.pixels[:, 0])
     if seen.sum() < FEWEST_POINTS:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.measurements import Measurements
 from handeye.types.arrays import FloatArray
@@ -69,7 +70,7 @@ class ArmModel:
         if measurements.joints.shape[1] != count:
             raise InputError(
                 f"the views have {measurements.joints.shape[1]} joint positions, the arm {count} joints",
-                code="wrong_arm",
+                code=Code.WRONG_ARM,
             )
 
     def at_flange(self, joints: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -18,6 +18,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate
 from handeye.types.arrays import FloatArray
@@ -56,7 +57,7 @@ def observability_indices(estimate: Estimate, informations: FloatArray) -> Indic
         The estimate knows no arm, or there is no view.
     """
     if estimate.arm is None or not len(informations):
-        raise InputError("observability is that of a known arm in views", code="no_arm")
+        raise InputError("observability is that of a known arm in views", code=Code.NO_ARM)
     total = informations.sum(axis=0)
     first = len(total) - estimate.arm.constants
     poses, constants = slice(0, _POSES), slice(first, len(total))

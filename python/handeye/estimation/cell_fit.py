@@ -38,7 +38,7 @@ MOST_CAMERAS = 4
 # Noise of a rotation or joint that arms in good order do not have, and about what they have at most.
 ROUGH_RAD, USUAL_NOISE_RAD = float(np.deg2rad(0.15)), float(np.deg2rad(0.03))
 # Where the arm is not described part of what hides shows as noise; by `handeye study cheap-arms`.
-NOT_DESCRIBED_POWER = 0.75
+NOT_DESCRIBED_POWER = 0.55
 # Components of the error whose constants belong to the arm.
 OF_ARM = frozenset({"joint_offsets", "links"})
 

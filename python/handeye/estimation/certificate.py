@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DegenerateError, InputError
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.rig import RigCalibration
@@ -138,7 +139,7 @@ def certify(problem: PoseProblem, X: FloatArray, Y: FloatArray) -> Certificate:
     """
     began = time.perf_counter()
     if len(problem.A) < 3:
-        raise InputError(f"{len(problem.A)} views, at least 3 are needed", code="too_few_views")
+        raise InputError(f"{len(problem.A)} views, at least 3 are needed", code=Code.TOO_FEW_VIEWS)
     given_x, given_y = X.reshape(-1, 4, 4), Y.reshape(-1, 4, 4)
     sigmas = problem.sigmas or _sigmas(problem, given_x, given_y)
     system = _System.of(problem, len(given_x), len(given_y), sigmas)
@@ -252,7 +253,7 @@ class _System:
         fixed, free = flat[:, : width + 1], flat[:, width + 1 :]
         values = np.linalg.svd(free, compute_uv=False)
         if values[-1] < 1e-9 * values[0]:
-            raise DegenerateError("these views do not determine the translations", code="degenerate")
+            raise DegenerateError("these views do not determine the translations", code=Code.DEGENERATE)
         solve = -np.asarray(np.linalg.lstsq(free, fixed, rcond=None)[0], np.float64)
         left = fixed + free @ solve
         return cls(np.asarray(np.linalg.qr(left, mode="r"), np.float64), solve)

@@ -5,6 +5,7 @@ Written out here because the installed package has no statistics library.
 
 import math
 
+from handeye.codes import Code
 from handeye.errors import InputError
 
 # Beyond this many degrees of freedom F is its limit to all digits that matter.
@@ -24,7 +25,8 @@ def regularised_incomplete_beta(a: float, b: float, x: float) -> float:
     """
     if not (a > 0 and b > 0 and 0 <= x <= 1):
         raise InputError(
-            f"incomplete beta at a={a}, b={b}, x={x}: expected a, b > 0 and x in 0 to 1", code="out_of_range"
+            f"incomplete beta at a={a}, b={b}, x={x}: expected a, b > 0 and x in 0 to 1",
+            code=Code.OUT_OF_RANGE,
         )
     if x in {0.0, 1.0}:
         return x
@@ -81,10 +83,10 @@ def f_quantile(probability: float, numerator: float, denominator: float) -> floa
         A probability outside 0 to 1 (both excluded), or degrees of freedom not above zero.
     """
     if not 0 < probability < 1:
-        raise InputError(f"probability {probability}, expected above 0 and below 1", code="out_of_range")
+        raise InputError(f"probability {probability}, expected above 0 and below 1", code=Code.OUT_OF_RANGE)
     if not (numerator > 0 and denominator > 0):
         raise InputError(
-            f"degrees of freedom {numerator} and {denominator}, expected above zero", code="out_of_range"
+            f"degrees of freedom {numerator} and {denominator}, expected above zero", code=Code.OUT_OF_RANGE
         )
     low, high = 0.0, 1.0
     while f_cumulative(high, numerator, denominator) < probability:

@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import DegenerateError, HandeyeError, InputError
 from handeye.estimation.measurements import Measurements
 from handeye.types.arrays import FloatArray
@@ -38,7 +39,7 @@ def check_views(measurements: Measurements) -> None:
         rejected = "".join(f"; {name}: {why}" for name, why in measurements.rejected.items())
         raise InputError(
             f"{len(measurements)} usable views, at least {MIN_VIEWS} are needed{rejected}",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
             hint="take more views of the target, with the camera turned about at least two axes between them",
         )
 
@@ -79,7 +80,7 @@ def closed_form_start(measurements: Measurements) -> Start:
     if degenerate is not None:
         raise degenerate
     reasons = "; ".join(f"{method}: {why}" for method, why in failures.items())
-    raise DegenerateError(f"no closed form found a start: {reasons}", code="no_start")
+    raise DegenerateError(f"no closed form found a start: {reasons}", code=Code.NO_START)
 
 
 def pose_distance(measurements: Measurements, x: FloatArray, y: FloatArray) -> float:

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import HandeyeError, InputError
 from handeye.types.arrays import FloatArray
 from handeye.types.camera import Camera
@@ -75,7 +76,8 @@ def view_pose(camera: Camera, target: Target, view: View) -> ViewPose:
     """
     if len(view) < MIN_POINTS:
         raise InputError(
-            f"view {view.name}: {len(view)} points, at least {MIN_POINTS} are needed", code="too_few_points"
+            f"view {view.name}: {len(view)} points, at least {MIN_POINTS} are needed",
+            code=Code.TOO_FEW_POINTS,
         )
     check_points(view, target)
     points = target.points[view.point_ids]
@@ -172,7 +174,7 @@ class Measurements:
                 raise InputError(
                     f"view {view.name}: {len(view.joints_rad or ())} joint positions, "
                     f"the first view has {len(self.views[0].joints_rad or ())}",
-                    code="no_joints",
+                    code=Code.NO_JOINTS,
                     hint="the arm's kinematics need the joint positions of every view: record them, or solve "
                     "without the arm",
                 )

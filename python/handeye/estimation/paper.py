@@ -3,6 +3,7 @@
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import DegenerateError, HandeyeError, SolveError
 from handeye.estimation.estimate import Estimate
 from handeye.estimation.initialize import Start, check_views, closed_form_start, pose_start
@@ -66,7 +67,7 @@ def paper_estimate(measurements: Measurements, previous: Estimate | None = None)
     if solution is None:
         raise SolveError(
             "the reprojection error could not be minimised from any start",
-            code="diverged",
+            code=Code.DIVERGED,
             hint="check that the poses belong to the images, and their units",
         )
     X, Y = Pose(solution.x), Pose(solution.y)

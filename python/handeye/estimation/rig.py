@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DegenerateError, InputError
 from handeye.estimation.attribution import noise_of
 from handeye.estimation.auto import attribution_of, estimate_of
@@ -141,7 +142,7 @@ class RigEstimate:
         if cameras[a].body is not cameras[b].body:
             raise InputError(
                 f"cameras {a} and {b} are not on one body: the arm moves them against each other",
-                code="not_rigid",
+                code=Code.NOT_RIGID,
             )
         pose = self.fit.X[a] @ self.fit.X[b].inverse()
         combination = np.zeros((6, len(self.fit.theta)))

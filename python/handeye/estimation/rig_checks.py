@@ -1,5 +1,6 @@
 """What is asked of a rig before it is estimated: whether all is tied to the arm, and mistakes in views."""
 
+from handeye.codes import Code
 from handeye.errors import HandeyeError, InputError
 from handeye.estimation.faults import Examination, examine
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
@@ -24,7 +25,7 @@ def check_tied(measurements: RigMeasurements) -> None:
         )
         raise InputError(
             f"{len(measurements.stations)} usable stations, at least {FEWEST_STATIONS} are needed{rejected}",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
             hint="take more stations, with the flange turned about at least two axes between them",
         )
     known: set[tuple[str, str]] = set()
@@ -41,7 +42,7 @@ def check_tied(measurements: RigMeasurements) -> None:
             other = Body.BASE if measurements.cameras[camera].body is Body.FLANGE else Body.FLANGE
             raise InputError(
                 f"camera {camera}: nothing ties it to the arm or to another camera",
-                code="not_tied",
+                code=Code.NOT_TIED,
                 hint=f"let it see a target on the {other.value} at {FEWEST_STATIONS} stations or more, or "
                 "one that another camera sees too",
             )
@@ -49,7 +50,7 @@ def check_tied(measurements: RigMeasurements) -> None:
         if ("target", target) not in known:
             raise InputError(
                 f"target {target}: no camera saw it",
-                code="not_tied",
+                code=Code.NOT_TIED,
                 hint="leave it out, or let a camera see it",
             )
 

@@ -19,6 +19,7 @@ from enum import StrEnum
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate
 from handeye.estimation.f_distribution import f_cumulative
@@ -185,7 +186,7 @@ def check_views(estimate: Estimate, views: Measurements, alarm: float = ALARM) -
         No view, or views without the joint positions of an arm that is known.
     """
     if len(views) == 0:
-        raise InputError("no view to check with", code="too_few_views", hint="take two, of the same board")
+        raise InputError("no view to check with", code=Code.TOO_FEW_VIEWS, hint="take two, of the same board")
     rows = rows_of(estimate, views)
     whitened, root = _whitened(rows)
     squared = float(whitened @ whitened)
@@ -338,7 +339,7 @@ def plan_check(
     if len(motions) < count or count < 2:
         raise InputError(
             f"{len(motions)} candidates for {count} views of a check, at least two of each are needed",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
         )
     _, rows, noise, _ = _chain_rows(estimate, motions, joints)
     noise = noise + _predicted_pixels(estimate, motions)
@@ -346,7 +347,7 @@ def plan_check(
     if len(usable) < count:
         raise InputError(
             f"{len(usable)} of {len(motions)} candidates show the board, {count} are needed",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
         )
     pairs = [(i, j) for i in usable for j in usable if j < i]
     chosen = sorted(max(pairs, key=lambda pair: _worth(estimate, rows, noise, pair)[0]))

@@ -19,6 +19,7 @@ from enum import StrEnum
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.confidence import PROBABILITY, radii
 from handeye.estimation.estimate import Estimate
@@ -211,7 +212,7 @@ def carried(
         return np.zeros((len(points), 3, 0)), noise
     if joints is None:
         raise InputError(
-            "the joint positions of every touch are needed where the arm is known", code="no_joints"
+            "the joint positions of every touch are needed where the arm is known", code=Code.NO_JOINTS
         )
     # On the left of A: with the camera in the hand A leads back, and is moved by the inverse.
     left = -at_flange if estimate.mounting is Mounting.EYE_IN_HAND else at_base

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import OutputError
 from handeye.export.mount import Mount
 from handeye.types import Pose
@@ -64,7 +65,7 @@ def fixed_axis_angles(pose: Pose) -> FloatArray:
     angles = pose.roll_pitch_yaw_rad
     deviation = float(np.abs(rotation_of(angles) - pose.rotation).max())
     if not deviation <= ANGLE_TOLERANCE:
-        raise OutputError(f"roll, pitch, yaw are {deviation:.1e} off the rotation", code="not_exact")
+        raise OutputError(f"roll, pitch, yaw are {deviation:.1e} off the rotation", code=Code.NOT_EXACT)
     return angles
 
 

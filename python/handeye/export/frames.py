@@ -7,6 +7,7 @@ accepted: nothing here needs escaping, and nothing can be smuggled in.
 import re
 from dataclasses import dataclass
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types import Mounting, Pose
 
@@ -32,7 +33,7 @@ def check_frame(name: str, what: str) -> str:
         raise InputError(
             f"{what}: {name[:60]!r}, expected 1 to {MAX_NAME_LENGTH} letters, digits, '_', '-' and '.', in "
             "parts joined by '/', beginning with a letter or '_'",
-            code="invalid_name",
+            code=Code.INVALID_NAME,
             hint="frames of tf2 have no leading slash",
         )
     return name
@@ -91,7 +92,7 @@ class Frames:
             if name in seen:
                 raise InputError(
                     f"{what}: {name!r} is the name of the {seen[name]} already",
-                    code="invalid_name",
+                    code=Code.INVALID_NAME,
                     hint="every frame has a name of its own",
                 )
             seen[name] = what

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.export.base import Exporter, hash_comments, number, quoted
 from handeye.export.mount import Mount
@@ -41,7 +42,7 @@ def _camera(camera: Camera) -> str:
     if camera.lens not in OPENCV_LENSES:
         raise InputError(
             f"a camera of lens {camera.lens}: OpenCV has no form for it",
-            code="unknown_lens",
+            code=Code.UNKNOWN_LENS,
             hint=f"export to another format, or calibrate with one of {', '.join(sorted(OPENCV_LENSES))}",
         )
     fisheye = int(camera.lens == "kannala_brandt")

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.reading import MIB, located, read_text
 from handeye.errors import InputError
 from handeye.export.solved import Rows, Solved
@@ -123,7 +124,7 @@ def _result(document: Solved) -> Result:
         rows = cast("Rows | None", getattr(document, name))
         if rows is None:
             raise InputError(
-                f"{name} is missing, though mounting is {document.mounting.value}", code="invalid_field"
+                f"{name} is missing, though mounting is {document.mounting.value}", code=Code.INVALID_FIELD
             )
         with located(name):
             poses.append(Pose(rows))
@@ -152,7 +153,7 @@ def _of_camera(table: dict[str, Any], camera: str | None, file: Path) -> dict[st
         asked = "" if camera is None else f"no camera {camera[:60]!r}; "
         raise InputError(
             f"{file}: {asked}{len(found)} cameras ({', '.join(map(str, found))[:100]})",
-            code="several_cameras" if found else "invalid_field",
+            code=Code.SEVERAL_CAMERAS if found else Code.INVALID_FIELD,
             hint="name one with --only" if found else "leave --only out: the answer is that of one camera",
         )
     return {"recording": table.get("recording", ""), **cast("dict[str, Any]", chosen)}
@@ -170,14 +171,14 @@ def _read_json(file: Path) -> dict[str, Any]:
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{file}: not JSON: {error}", code="not_json") from error
+        raise InputError(f"{file}: not JSON: {error}", code=Code.NOT_JSON) from error
     if not isinstance(data, dict):
-        raise InputError(f"{file}: expected the JSON object that a solve writes", code="invalid_field")
+        raise InputError(f"{file}: expected the JSON object that a solve writes", code=Code.INVALID_FIELD)
     table = cast("dict[str, Any]", data)
     if "error" in table and not {"mounting", "cameras"} & set(table):
         raise InputError(
             f"{file}: no result but an error",
-            code="no_result",
+            code=Code.NO_RESULT,
             hint="look at the message in it and solve again",
         )
     return table
@@ -188,7 +189,7 @@ def _covariance(rows: Rows) -> FloatArray:
     scale = np.sqrt(np.abs(np.outer(np.diag(covariance), np.diag(covariance))))
     symmetric = bool(np.all(np.abs(covariance - covariance.T) <= 1e-6 * scale))
     if not symmetric or bool(np.any(np.diag(covariance) < 0)):
-        raise InputError("covariance: not symmetric, or a variance below zero", code="invalid_field")
+        raise InputError("covariance: not symmetric, or a variance below zero", code=Code.INVALID_FIELD)
     return covariance
 
 

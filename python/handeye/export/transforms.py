@@ -15,6 +15,7 @@ from typing import cast
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.documents import yaml_of
 from handeye.datasets.easy_handeye2 import Transform as RosTransform
 from handeye.datasets.reading import MIB, located, number, read_text
@@ -82,7 +83,7 @@ def transform_of(text: str) -> Transform:
     raise InputError(
         "no transform in it, expected what handeye export writes: static_transform_publisher, a URDF joint, "
         "a launch file, easy_handeye, FileStorage or JSON",
-        code="unknown_format",
+        code=Code.UNKNOWN_FORMAT,
     )
 
 
@@ -110,12 +111,12 @@ def checked_text(exporter: Exporter, mount: Mount) -> str:
     try:
         back = transform_of(text)
     except InputError as error:
-        raise OutputError(f"{exporter.name}: not read back: {error.message}", code="not_exact") from error
+        raise OutputError(f"{exporter.name}: not read back: {error.message}", code=Code.NOT_EXACT) from error
     deviation = float(np.abs(back.T_parent_child.matrix - mount.T_parent_child.matrix).max())
     if (back.parent, back.child) != (mount.parent, mount.child) or not deviation <= TOLERANCE:
         raise OutputError(
             f"{exporter.name}: read back as {back.parent} -> {back.child}, {deviation:.1e} off",
-            code="not_exact",
+            code=Code.NOT_EXACT,
         )
     return text
 
@@ -138,7 +139,7 @@ def _node(text: str) -> Transform | None:
     match = re.search(r'\bargs="([^"<>]*)"', body)
     words = match.group(1).split() if match else []
     if len(words) != 9:
-        raise InputError(f"args of {len(words)} words, expected 9", code="wrong_shape")
+        raise InputError(f"args of {len(words)} words, expected 9", code=Code.WRONG_SHAPE)
     return _quaternion(words[:7], words[7], words[8])
 
 
@@ -158,7 +159,7 @@ def _joint(text: str) -> Transform | None:
     }
     found = {name: match.group(1) for name, match in parts.items() if match}
     if len(found) < len(parts):
-        raise InputError("a joint without parent, child or origin", code="invalid_field")
+        raise InputError("a joint without parent, child or origin", code=Code.INVALID_FIELD)
     matrix = np.eye(4)
     matrix[:3, :3] = rotation_of(np.array(_three(found["rpy"], "rpy")))
     matrix[:3, 3] = _three(found["xyz"], "xyz")
@@ -218,7 +219,7 @@ def _storage(table: Mapping[str, object]) -> Transform | None:
     data = cast("Mapping[str, object]", matrix).get("data")
     words = cast("list[object]", data) if isinstance(data, list) else []
     if len(words) != 16:
-        raise InputError(f"{name}: {len(words)} numbers, expected 16", code="wrong_shape")
+        raise InputError(f"{name}: {len(words)} numbers, expected 16", code=Code.WRONG_SHAPE)
     values = np.array([number(str(word), str(name)) for word in words]).reshape(4, 4)
     return Transform(str(table["parent_frame"]), str(table["child_frame"]), Pose(values))
 
@@ -231,7 +232,7 @@ def _quaternion(words: list[str], parent: str, child: str) -> Transform:
 def _three(text: str, what: str) -> list[float]:
     words = text.split()
     if len(words) != 3:
-        raise InputError(f"{what}: {len(words)} numbers, expected 3", code="wrong_shape")
+        raise InputError(f"{what}: {len(words)} numbers, expected 3", code=Code.WRONG_SHAPE)
     return [number(word, what) for word in words]
 
 

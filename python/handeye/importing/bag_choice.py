@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets import DataWarning
 from handeye.datasets.bags import Contents, TimesOf, Track, chain, parents, rising, way
 from handeye.datasets.bags.contents import Joints, Stamps, matrices
@@ -142,7 +143,7 @@ def _image_topic(contents: Contents, options: BagOptions) -> str:
     if len(plain) > 1:
         raise InputError(
             f"{contents.path}: pictures on {', '.join(sorted(plain)[:10])}",
-            code="ambiguous_format",
+            code=Code.AMBIGUOUS_FORMAT,
             hint="name the camera with --image-topic",
         )
     return plain[0]
@@ -194,7 +195,7 @@ class _OfJoints(_Source):
             told = ", ".join(sorted({name for one in self._joints.positions[:100] for name in one})[:20])
             raise InputError(
                 f"{self._topic}: joints {told}, expected {', '.join(arm.joint_names)} of arm {arm.name}",
-                code="wrong_arm",
+                code=Code.WRONG_ARM,
                 hint="give the description of this robot with --robot",
             )
         rows = np.array(
@@ -242,7 +243,7 @@ def _needed_arm(contents: Contents, options: BagOptions, arm: Arm | None) -> Arm
         return parse_urdf(contents.description.encode(), base=options.base_frame, tip=options.flange_frame)
     raise InputError(
         f"{contents.path}: the bag has joint positions and no description of the robot",
-        code="unknown_arm",
+        code=Code.UNKNOWN_ARM,
         hint="give its URDF with --robot",
     )
 
@@ -272,7 +273,7 @@ def _of_frames(contents: Contents, options: BagOptions) -> _Source:
         named = ", ".join(known[:30])
         raise InputError(
             f"{contents.path}: which frames of tf are the robot's base and flange? There are {named}",
-            code="unknown_frame",
+            code=Code.UNKNOWN_FRAME,
             hint="name them with --base-frame and --flange-frame",
         )
     said = options.base_frame is not None and options.flange_frame is not None
@@ -331,6 +332,6 @@ def _no_topic(contents: Contents, what: str, kinds: Sequence[str]) -> InputError
     there = ", ".join(fitting[:20]) or ", ".join(sorted(contents.topics)[:20]) or "nothing"
     return InputError(
         f"{contents.path}: no {what}; the bag has {there}",
-        code="missing_topic",
+        code=Code.MISSING_TOPIC,
         hint=f"expected {' or '.join(kinds)}" + (f", camera {CAMERA_INFO}" if IMAGE in kinds else ""),
     )

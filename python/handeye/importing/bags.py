@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets import ImageSet, Shot
 from handeye.datasets.bags import Contents, Station, Track, fetch_pictures, grey_of, stations
 from handeye.datasets.bags.messages import Compressed, Raw
@@ -107,7 +108,7 @@ class BagPictures:
             raise InputError(
                 f"{self.contents.path}: the arm stood still {len(self._stood)} times, never while a picture "
                 "was taken",
-                code="no_stations",
+                code=Code.NO_STATIONS,
                 hint="let the arm stand for half a second before it moves on; docs/commands/import.md",
             )
         places = _some(sorted(picked), MOST_STATIONS)
@@ -197,7 +198,7 @@ def pictures_of(
     """
     chosen = choose(contents, options, arm)
     if np.any(np.diff(chosen.track.times_s) < 0):
-        raise InputError(f"{contents.path}: times that run backwards", code="damaged_bag")
+        raise InputError(f"{contents.path}: times that run backwards", code=Code.DAMAGED_BAG)
     return BagPictures(contents, chosen, target, mounting)
 
 

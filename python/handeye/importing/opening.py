@@ -7,6 +7,7 @@ from enum import StrEnum
 from functools import partial
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets import (
     DataWarning,
     ImageSet,
@@ -163,7 +164,7 @@ def open_folder(
     if isinstance(opened, PosePairs):
         raise InputError(
             f"{opened.name}: poses of the target without pictures, expected pictures or corners",
-            code="no_pictures",
+            code=Code.NO_PICTURES,
             hint="handeye solve takes it; other commands need what the camera saw",
         )
     return opened
@@ -292,7 +293,7 @@ def _detect(
             if wrong == done == ENOUGH_OF_WRONG_SIZE:
                 raise DetectionError(
                     f"the first {done} of {total} images show another target; {outcome.message}",
-                    code="not_detected",
+                    code=Code.NOT_DETECTED,
                     hint=outcome.hint,
                 ) from outcome
 
@@ -319,7 +320,7 @@ def _check_size(camera: Camera, size: tuple[int, int], what: str) -> None:
         raise InputError(
             f"the camera is calibrated for {camera.width_px} x {camera.height_px} pixels, {what} have "
             f"{size[0]} x {size[1]}",
-            code="image_size",
+            code=Code.IMAGE_SIZE,
             hint="give the calibration at the size of the pictures, or leave the camera out: it is then "
             "calibrated from the pictures",
         )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.datasets import PosePairs
 from handeye.errors import HandeyeError, InputError, SolveError
 from handeye.estimation.confidence import Within, within
@@ -101,7 +102,7 @@ def solve_poses(pairs: PosePairs) -> PosesSolved:
     """
     if len(pairs) < MIN_VIEWS:
         raise InputError(
-            f"{pairs.name}: {len(pairs)} samples, at least {MIN_VIEWS} are needed", code="too_few_views"
+            f"{pairs.name}: {len(pairs)} samples, at least {MIN_VIEWS} are needed", code=Code.TOO_FEW_VIEWS
         )
     motions, seen = pairs.motions, pairs.camera_poses
     kept, x, y = _first_fit(pairs)
@@ -110,7 +111,7 @@ def solve_poses(pairs: PosePairs) -> PosesSolved:
         raise SolveError(
             f"{pairs.name}: the poses of robot and target contradict each other: half of the {len(pairs)} "
             f"samples are off by more than {1e3 * distance:.3g} mm and {np.rad2deg(angle):.2g} deg",
-            code="inconsistent",
+            code=Code.INCONSISTENT,
             hint=_other_mounting(pairs)
             or "are both in metres, in the same order, and the poses of the target those in the camera?",
         )

@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets import DataWarning, holds_several, read_rig, recording_warnings, rig_warnings
 from handeye.datasets.image_header import IMAGE_SUFFIXES
 from handeye.datasets.reading import file_names, folder_names, is_file
@@ -106,7 +107,7 @@ def open_rig(
     if options.camera is not None:
         raise InputError(
             f"{folder}: one camera given for several",
-            code="several_cameras",
+            code=Code.SEVERAL_CAMERAS,
             hint="give a chain of Kalibr with as many cameras, or put a file into the folder of each camera",
         )
     if is_file(folder / FILE_NAME):
@@ -141,7 +142,7 @@ def one_camera(opened: OpenedRig, name: str) -> Opened:
         known = ", ".join(recording.cameras)
         raise InputError(
             f"{opened.folder}: camera {name[:60]!r} saw no target that the arm moves; there are {known}",
-            code="several_cameras",
+            code=Code.SEVERAL_CAMERAS,
         )
     found = replace(max(seen, key=len), name=f"{recording.name} {name}")
     return Opened(
@@ -169,7 +170,7 @@ def _by_name(names: list[str], cameras: Mapping[str, Camera]) -> dict[str, Camer
         raise InputError(
             f"{len(cameras)} cameras given ({', '.join(cameras)[:80]}) for {len(names)} "
             f"({', '.join(names)[:80]})",
-            code="several_cameras",
+            code=Code.SEVERAL_CAMERAS,
             hint="give as many as there are, in the order of their names",
         )
     return dict(zip(names, cameras.values(), strict=True))
@@ -219,7 +220,7 @@ def _of_folders(
         target = MountedTarget(opened.recording.target, Body.BASE if in_hand else Body.FLANGE)
         if targets.setdefault(TARGET, target) != target:
             raise InputError(
-                f"camera {name}: another target or mounting than that of {names[0]}", code="invalid_field"
+                f"camera {name}: another target or mounting than that of {names[0]}", code=Code.INVALID_FIELD
             )
         origins[name], missed[name] = opened.camera_origin, opened.missed
         warnings |= {str(warning): warning for warning in opened.warnings}

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets import DataWarning, PosePairs
 from handeye.datasets.bags.tracks import Track
 from handeye.datasets.pose_pairs import PoseStreams, numbered
@@ -43,7 +44,7 @@ def pairs_of(streams: PoseStreams) -> PosePairs:
     if streams.mounting is None:
         raise InputError(
             f"{streams.name}: the poses do not say where the camera sits",
-            code="mounting_unstated",
+            code=Code.MOUNTING_UNSTATED,
             hint="state --mounting eye_in_hand or eye_to_hand",
         )
     moments = _moments(streams)
@@ -80,7 +81,7 @@ def _moments(streams: PoseStreams) -> _Moments:
         raise InputError(
             f"{streams.name}: {len(inside)} poses of the target while the robot's are known, at least "
             f"{FEWEST_PAIRS} are needed",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
             hint="both files must be of one clock, up to a second",
         )
     chosen = inside[np.linspace(0, len(inside) - 1, min(len(inside), MOST_PAIRS)).round().astype(int)]
@@ -131,6 +132,6 @@ def _way_round(
         return turned, [DataWarning("poses_inverted", message)]
     raise InputError(
         f"{streams.name}: the poses of the target fit as they are and turned round",
-        code="inconsistent",
+        code=Code.INCONSISTENT,
         hint="record turns about different axes, or name the files as poses_B_H.csv and poses_W_E.csv",
     )

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from handeye.codes import Code
 from handeye.datasets import Reading, UnreadPoses
 from handeye.datasets.image_set import WrittenPoses
 from handeye.datasets.pose_rows import same_meaning
@@ -91,7 +92,7 @@ def misread(
         f"{best} apart{apart}",
         hint="or correct what the file itself says",
         options=("--poses", written.file, *best.reading.options),
-        code="wrong_unit" if _in_degrees(best.reading) == _in_degrees(said) else "wrong_rotation",
+        code=Code.WRONG_UNIT if _in_degrees(best.reading) == _in_degrees(said) else Code.WRONG_ROTATION,
     )
 
 

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types import Pose
 from handeye.types.arrays import FloatArray
@@ -365,4 +366,4 @@ def check_count(count: int, form: Form, what: str) -> None:
     """
     if count not in form.counts:
         expected = " or ".join(map(str, form.counts))
-        raise InputError(f"{what}: {count} numbers, expected {expected}", code="wrong_shape")
+        raise InputError(f"{what}: {count} numbers, expected {expected}", code=Code.WRONG_SHAPE)

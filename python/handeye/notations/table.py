@@ -46,6 +46,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.notations.forms import Euler, Form, Matrix, Nine, Quaternion, RotationVector, Vector, check_count
 from handeye.types import Pose
@@ -133,13 +134,13 @@ class Notation:
         """
         values = np.array(numbers, dtype=np.float64).reshape(1, -1)
         if not np.isfinite(values).all():
-            raise InputError(f"{self.name}: a number that is not finite", code="not_finite")
+            raise InputError(f"{self.name}: a number that is not finite", code=Code.NOT_FINITE)
         check_count(values.shape[1] - self.leading, self.form, self.name)
         matrix = self.matrices(values, unit or self.default_unit)[0]
         if np.isnan(matrix).any():
             quaternion = isinstance(self.form, Vector) and isinstance(self.form.rotation, Quaternion)
             found = "a quaternion whose norm is not 1" if quaternion else "a last row that is not 0 0 0 1"
-            raise InputError(f"{self.name}: {found}", code="not_rigid")
+            raise InputError(f"{self.name}: {found}", code=Code.NOT_RIGID)
         return Pose(matrix)
 
     def numbers(self, pose: Pose, unit: Unit | None = None) -> tuple[float, ...]:
@@ -222,7 +223,7 @@ def unit_of(name: str) -> Unit:
         return Unit(name.strip().lower())
     except ValueError:
         raise InputError(
-            f"unit {name[:60]!r}, expected one of {', '.join(Unit)}", code="unknown_unit"
+            f"unit {name[:60]!r}, expected one of {', '.join(Unit)}", code=Code.UNKNOWN_UNIT
         ) from None
 
 
@@ -238,7 +239,7 @@ def direction_of(name: str) -> Direction:
         return Direction(_NOT_A_NAME.sub("_", name.strip().lower()))
     except ValueError:
         raise InputError(
-            f"poses are {name[:60]!r}, expected {' or '.join(Direction)}", code="unknown_direction"
+            f"poses are {name[:60]!r}, expected {' or '.join(Direction)}", code=Code.UNKNOWN_DIRECTION
         ) from None
 
 
@@ -255,7 +256,7 @@ def notation_of(name: str) -> Notation:
         names = ", ".join(n.name for n in (*MAKERS, *PLAIN))
         raise InputError(
             f"notation {name[:60]!r}, expected one of {names}, or euler_zyx_moving_deg and its like",
-            code="unknown_notation",
+            code=Code.UNKNOWN_NOTATION,
             hint="docs/conventions.md has the table of notations",
         )
     return found

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.notations.forms import about
 from handeye.notations.table import Notation, Unit
@@ -43,14 +44,14 @@ def read_pose_text(text: str, notation: Notation, unit: Unit | None = None) -> P
         Not the numbers of one pose.
     """
     if len(text) > MAX_TEXT:
-        raise InputError(f"{len(text)} characters, expected one pose", code="too_large")
+        raise InputError(f"{len(text)} characters, expected one pose", code=Code.TOO_LARGE)
     hint = f"write it as {example(notation, unit)}"
     named = labelled_numbers(text, notation)
     if named is None:
         numbers = read_numbers(text)
     elif len(named) < len(notation.labels):
         missing = ", ".join(label for label in notation.labels if label not in named)
-        raise InputError(f"{missing} missing", code="wrong_shape", hint=hint)
+        raise InputError(f"{missing} missing", code=Code.WRONG_SHAPE, hint=hint)
     else:
         numbers = [named[label] for label in notation.labels]
     try:
@@ -76,7 +77,7 @@ def labelled_numbers(text: str, notation: Notation) -> dict[str, float] | None:
     for name, value in re.findall(pattern, text, re.ASCII | re.IGNORECASE):
         label = known[name.lower()]
         if label in found:
-            raise InputError(f"{label} is there twice", code="duplicate_value")
+            raise InputError(f"{label} is there twice", code=Code.DUPLICATE_VALUE)
         found[label] = float(value)
     return found or None
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate, regular_information
 from handeye.planning.candidates import Candidate, Pool
@@ -90,7 +91,7 @@ def plan_batch(
     """
     if objective not in OBJECTIVES:
         raise InputError(
-            f"objective {objective!r}, expected one of {', '.join(OBJECTIVES)}", code="unknown_criterion"
+            f"objective {objective!r}, expected one of {', '.join(OBJECTIVES)}", code=Code.UNKNOWN_CRITERION
         )
     prediction = Prediction(estimate, sight or Sight())
     informations = prediction.informations(pool.motions(estimate.mounting), pool.joints)
@@ -98,7 +99,7 @@ def plan_batch(
     if not 1 <= count <= len(feasible):
         raise InputError(
             f"{count} views of {len(feasible)} feasible candidates cannot be chosen",
-            code="too_few_candidates",
+            code=Code.TOO_FEW_CANDIDATES,
             hint="offer more candidates that show the target",
         )
     offered = informations[feasible]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray
 from handeye.types.mounting import Mounting
@@ -49,7 +50,7 @@ class Pool:
         names = [candidate.name for candidate in self.candidates]
         if len(set(names)) < len(names):
             twice = next(name for name in names if names.count(name) > 1)
-            raise InputError(f"candidate {twice}: the name is there twice", code="duplicate_candidate")
+            raise InputError(f"candidate {twice}: the name is there twice", code=Code.DUPLICATE_CANDIDATE)
 
     @classmethod
     def of_views(cls, views: Iterable[View]) -> "Pool":

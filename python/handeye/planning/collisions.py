@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm
@@ -58,13 +59,13 @@ class Workspace:
         if not np.isfinite([self.floor_m, *radii]).all():
             raise InputError(
                 f"workspace: floor at {self.floor_m} m, radii of {radii[0]} and {radii[1]} m",
-                code="not_finite",
+                code=Code.NOT_FINITE,
                 hint="state the height of table or floor as a number",
             )
         if (lower >= upper).any() or min(radii) < 0:
             raise InputError(
                 f"workspace: from {lower} to {upper}, expected a box with an inside, radii not negative",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
             )
         object.__setattr__(self, "lower_m", lower)
         object.__setattr__(self, "upper_m", upper)

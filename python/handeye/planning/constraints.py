@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate
 from handeye.estimation.lens_confidence import lens_deviation_px
@@ -57,7 +58,7 @@ class ViewLimits:
             raise InputError(
                 f"views from {near} to {far} m, tilted up to {np.rad2deg(self.tilt_rad):.0f} deg, margin "
                 f"{self.margin_px} px: expected ranges with an inside",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
             )
 
 

@@ -12,6 +12,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.planning.candidates import Candidate
 from handeye.planning.travel import Travel
@@ -94,7 +95,7 @@ def travel_order(
         Nothing to order, or a speed that is not above zero.
     """
     if not candidates:
-        raise InputError("no views to order", code="no_candidates")
+        raise InputError("no views to order", code=Code.NO_CANDIDATES)
     places = (present, *candidates)
     joints = [place.joints_rad for place in places if place.joints_rad is not None]
     if len(joints) == len(places) and len({len(values) for values in joints}) == 1:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate, Estimator
 from handeye.estimation.measurements import Measurements
@@ -214,10 +215,10 @@ class Planner:
             The view's name is taken, or the target's pose cannot be found in it; nothing has changed then.
         """
         if any(view.name == other.name for other in self._measurements.views):
-            raise InputError(f"view {view.name}: already taken", code="duplicate_view")
+            raise InputError(f"view {view.name}: already taken", code=Code.DUPLICATE_VIEW)
         measurements = self._measurements.with_views([view])
         if view.name in measurements.rejected:
-            raise InputError(f"view {view.name}: {measurements.rejected[view.name]}", code="unusable_view")
+            raise InputError(f"view {view.name}: {measurements.rejected[view.name]}", code=Code.UNUSABLE_VIEW)
         before = self._estimate
         estimate = self._estimator(measurements, before)
         proposal = self._pending

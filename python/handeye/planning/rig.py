@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation import Estimate, RigEstimate
 from handeye.estimation.confidence import Within
@@ -55,7 +56,7 @@ class RigRequest:
 
     def __post_init__(self) -> None:
         if min(self.translation_mm, self.rotation_deg, *(self.camera_to_camera or ())) <= 0:
-            raise InputError("an accuracy above zero is needed", code="out_of_range")
+            raise InputError("an accuracy above zero is needed", code=Code.OUT_OF_RANGE)
 
     def missing(self, estimate: RigEstimate) -> dict[tuple[str, ...], float]:
         """Return what does not meet the request, and by which factor; cameras, or two in each other."""
@@ -272,7 +273,7 @@ def _joint(
             total = np.zeros((len(motions), count + shared, count + shared))
         total[:, np.array(rows)[:, None], rows] += own * visible[camera, target][:, None, None]
     if total is None:
-        raise InputError("no camera moves against a target", code="not_tied")
+        raise InputError("no camera moves against a target", code=Code.NOT_TIED)
     across, of_error = total[:, :count, count:], total[:, count:, count:]
     eliminated = across @ np.linalg.solve(of_error + np.eye(of_error.shape[1]), np.swapaxes(across, 1, 2))
     return total[:, :count, :count] - eliminated

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots import Arm
 from handeye.robots.shapes import Shape
@@ -47,7 +48,7 @@ class SolidLinks:
         except ImportError as error:
             raise InputError(
                 "shapes of links need the extra meshes",
-                code="missing_package",
+                code=Code.MISSING_PACKAGE,
                 hint="pip install handeye[meshes]",
             ) from error
         self._fcl: Any = fcl
@@ -63,7 +64,7 @@ class SolidLinks:
         by_construction = (bare >= _ALWAYS) | ((bare == 0) & (thick > _OFTEN))
         self._pairs = [pair for pair, left_out in zip(apart, by_construction, strict=True) if not left_out]
         if not self._pairs:
-            raise InputError("the description has no shapes of links that could touch", code="no_shapes")
+            raise InputError("the description has no shapes of links that could touch", code=Code.NO_SHAPES)
 
     def touch(self, joints: ArrayLike) -> bool:
         """Tell whether links touch in any of postures (N, n)."""
@@ -125,9 +126,9 @@ def _mesh(shape: Shape, padding_m: float) -> tuple[FloatArray, NDArray[np.int64]
         vertices = finite_array(np.asarray(mesh.vertices) * shape.size, (None, 3), "vertices")
         faces = np.asarray(mesh.faces, dtype=np.int64)
     except Exception as error:
-        raise InputError(f"{file}: no mesh: {error}", code="unusable_mesh") from error
+        raise InputError(f"{file}: no mesh: {error}", code=Code.UNUSABLE_MESH) from error
     if len(faces) == 0:
-        raise InputError(f"{file}: a mesh without faces", code="unusable_mesh")
+        raise InputError(f"{file}: a mesh without faces", code=Code.UNUSABLE_MESH)
     corners = vertices[faces]
     # As long as twice the area: larger faces weigh more in the normal of a vertex.
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

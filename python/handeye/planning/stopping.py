@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.accuracy import tool_deviations_m
 from handeye.estimation.estimate import Estimate
@@ -98,7 +99,7 @@ class NumberOfViews(StopRule):
 
     def __post_init__(self) -> None:
         if self.views < 3:
-            raise InputError(f"number of views {self.views}, expected at least 3", code="out_of_range")
+            raise InputError(f"number of views {self.views}, expected at least 3", code=Code.OUT_OF_RANGE)
 
     def verdict(self, state: State) -> Stop | None:
         """Stop once enough views are taken."""

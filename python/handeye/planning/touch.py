@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.estimate import Estimate
 from handeye.estimation.measurements import Measurements
@@ -45,7 +46,7 @@ class TouchAccuracy(StopRule):
 
     def __post_init__(self) -> None:
         if not self.radius_mm > 0:
-            raise InputError(f"touch error {self.radius_mm} mm, expected above zero", code="out_of_range")
+            raise InputError(f"touch error {self.radius_mm} mm, expected above zero", code=Code.OUT_OF_RANGE)
 
     def verdict(self, state: State) -> Stop | None:
         """Stop once the worst point of the box is good enough."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, finite_array
 
@@ -42,7 +43,7 @@ class Travel:
         start = finite_array(self.start, (None,), "travel: start")
         velocities = finite_array(self.velocities, (len(start),), "travel: velocities")
         if (velocities <= 0).any() or min(self.ramp_s, self.look_s) <= 0:
-            raise InputError("travel: speeds and times above zero are expected", code="out_of_range")
+            raise InputError("travel: speeds and times above zero are expected", code=Code.OUT_OF_RANGE)
         object.__setattr__(self, "start", start)
         object.__setattr__(self, "velocities", velocities)
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.pattern import tile_bits
 from handeye.printing.outline import outline
@@ -46,7 +47,7 @@ def ink_of(target: Target) -> Ink:
     if isinstance(target, CircleGrid) and target.marked is not None and target.marked_diameter_m is None:
         raise InputError(
             "circle_grid: a marked circle without marked_diameter_m cannot be drawn",
-            code="invalid_field",
+            code=Code.INVALID_FIELD,
             hint="say how large it is to be",
         )
     artwork = target.artwork()

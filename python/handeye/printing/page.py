@@ -1,5 +1,6 @@
 """A drawing as a file."""
 
+from handeye.codes import Code
 from handeye.errors import OutputError
 from handeye.printing.shapes import Drawing
 from handeye.printing.svg import svg
@@ -18,7 +19,9 @@ def page(drawing: Drawing, kind: str) -> bytes:
     if kind == "svg":
         return svg(drawing)
     if kind != "pdf":
-        raise OutputError(f"a page as {kind[:20]!r}, expected {' or '.join(FORMATS)}", code="unknown_format")
+        raise OutputError(
+            f"a page as {kind[:20]!r}, expected {' or '.join(FORMATS)}", code=Code.UNKNOWN_FORMAT
+        )
     from handeye.printing.pdf import pdf  # noqa: PLC0415 - matplotlib takes a while
 
     return pdf(drawing)

@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 
+from handeye.codes import Code
 from handeye.errors import InputError
 
 # Anything from a business card to a plotter's roll.
@@ -45,7 +46,7 @@ class Paper:
             if not SMALLEST_MM <= side <= LARGEST_MM:
                 raise InputError(
                     f"paper: a side of {side:g} mm, expected {SMALLEST_MM:g} to {LARGEST_MM:g} mm",
-                    code="out_of_range",
+                    code=Code.OUT_OF_RANGE,
                 )
 
     @classmethod
@@ -64,7 +65,7 @@ class Paper:
         if custom is None:
             raise InputError(
                 f"paper: {text[:40]!r}, expected {', '.join(_NAMED)} or WIDTHxHEIGHT in mm such as 600x400",
-                code="unknown_paper",
+                code=Code.UNKNOWN_PAPER,
             )
         width, height = map(float, custom.groups())
         return cls(width, height, f"{width:g} x {height:g} mm")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.printing import ruler
 from handeye.printing.ink import Ink, ink_of
@@ -79,7 +80,7 @@ def lay_out(target: Target, paper: Paper) -> Sheet:
     need = size + _Room(paper, caption, size, ink.quiet_mm).around
     raise InputError(
         f"{caption}: needs {need[0]:.0f} x {need[1]:.0f} mm with margin and rulers, more than {paper.name}",
-        code="does_not_fit",
+        code=Code.DOES_NOT_FIT,
         hint="take larger paper or smaller measures; without any, the largest that fit are taken",
     )
 
@@ -109,7 +110,7 @@ def largest(family: str, asked: Mapping[str, Any], paper: Paper) -> Target:
         if most >= 10:
             return member.usual(round(most * step / 1000, 9), asked)
     raise InputError(
-        f"{family}: does not fit on {paper.name}", code="does_not_fit", hint="fewer rows and columns"
+        f"{family}: does not fit on {paper.name}", code=Code.DOES_NOT_FIT, hint="fewer rows and columns"
     )
 
 

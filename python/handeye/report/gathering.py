@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.reading import located
 from handeye.errors import InputError
 from handeye.estimation import Measurements, calibrate_examined
@@ -172,7 +173,7 @@ def _told(result: Result) -> tuple[Solved, Noise, float]:
     if solved is None or solved.noise is None or solved.rmse_px is None or not solved.model:
         raise InputError(
             "rmse_px, noise or model is missing, expected all that a solve writes",
-            code="invalid_field",
+            code=Code.INVALID_FIELD,
             hint="give the JSON object as `handeye solve --json` wrote it",
         )
     return solved, solved.noise, solved.rmse_px

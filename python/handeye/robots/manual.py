@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, HandeyeError, InputError
 from handeye.notations import (
     NOTATIONS,
@@ -103,7 +104,7 @@ class ManualRobot:
             found = self._read("pose of the flange now", None, still)
             self._reading = found or self._reading
         if self._reading is None:
-            raise DeviceError("nobody says where the arm stands", code="no_answer")
+            raise DeviceError("nobody says where the arm stands", code=Code.NO_ANSWER)
         self._doubtful = False
         return self._reading
 
@@ -128,7 +129,7 @@ class ManualRobot:
                 # Words about joints that were typed wrongly are words of a driver that reads wrongly.
                 return checked_reading(Reading(reading.T_base_flange, joints), self._arm, joints_needed=False)
             except HandeyeError as error:
-                if error.code in {"motion_refused", "no_answer"}:
+                if error.code in {Code.MOTION_REFUSED, Code.NO_ANSWER}:
                     raise
                 self._tell(f"{error.message}; a pose is written as {example(self._notation, self._unit)}")
 
@@ -153,9 +154,9 @@ class ManualRobot:
         try:
             text = self._ask(question).strip()
         except EOFError as error:
-            raise DeviceError("nobody answers", code="no_answer") from error
+            raise DeviceError("nobody answers", code=Code.NO_ANSWER) from error
         if text.lower() in SKIP:
-            raise DeviceError("skipped by hand", code="motion_refused")
+            raise DeviceError("skipped by hand", code=Code.MOTION_REFUSED)
         return text
 
     def _plausible(self, pose: Pose) -> Pose:
@@ -175,7 +176,7 @@ class ManualRobot:
         raise InputError(
             f"the flange would be {1e3 * far:.4g} mm from the base, and {self._arm.name} is within "
             f"{1e3 * reach:.0f} mm; expected {units_of(self._notation, self._unit)}",
-            code="out_of_reach",
+            code=Code.OUT_OF_REACH,
         )
 
 
@@ -197,7 +198,7 @@ def joints_of_numbers(arm: Arm, numbers: Sequence[float]) -> FloatArray:
         Another number of them.
     """
     if len(numbers) != len(arm):
-        raise InputError(f"{len(numbers)} joint positions, expected {len(arm)}", code="wrong_shape")
+        raise InputError(f"{len(numbers)} joint positions, expected {len(arm)}", code=Code.WRONG_SHAPE)
     values = np.array(numbers, dtype=np.float64)
     return np.where(arm.sliding, values / 1e3, np.deg2rad(values))
 

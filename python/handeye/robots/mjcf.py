@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots.model import Arm, Joint
 from handeye.robots.xml_tree import Element, read_xml
@@ -79,7 +80,7 @@ def parse_mjcf(content: bytes, *, tip: str | None = None) -> Arm:
     if root.tag != "mujoco":
         raise InputError(
             f"line {root.line}: <{root.tag[:60]}>, expected <mujoco>",
-            code="not_mjcf",
+            code=Code.NOT_MJCF,
             hint="give a MuJoCo model",
         )
     _refuse_includes(root)
@@ -93,7 +94,7 @@ def parse_mjcf(content: bytes, *, tip: str | None = None) -> Arm:
     _walk(Element("body", {}, world.line, world.children), (), Pose.identity(), "", model)
     place = _tip(model, tip)
     if not place.joints:
-        raise InputError("no joint that moves before the tip", code="unusable_arm")
+        raise InputError("no joint that moves before the tip", code=Code.UNUSABLE_ARM)
     name = root.attributes.get("model", "arm")[:100] or "arm"
     return Arm(name, place.joints, place.rest, "world", place.name)
 
@@ -291,22 +292,22 @@ def _tip(model: _Model, wanted: str | None) -> _Place:
         if place is None:
             shown = ", ".join(list({**model.places, **model.sites})[:20])
             raise InputError(
-                f"no body or site {wanted[:60]!r}", code="unknown_link", hint=f"there are {shown}"
+                f"no body or site {wanted[:60]!r}", code=Code.UNKNOWN_LINK, hint=f"there are {shown}"
             )
         return place
     if not model.places:
-        raise InputError("no body with a name", code="unusable_arm")
+        raise InputError("no body with a name", code=Code.UNUSABLE_ARM)
     most = max(len(place.joints) for place in model.places.values())
     last = [place for place in model.places.values() if len(place.joints) == most]
     chains = {tuple(joint.name for joint in place.joints) for place in last}
     if len(chains) > 1:
         raise InputError(
             f"the arm could end in any of {', '.join(place.name[:60] for place in last[:12])}",
-            code="ambiguous_arm",
+            code=Code.AMBIGUOUS_ARM,
             hint="say which body or site is the flange whose pose the robot reports",
         )
     return last[0]
 
 
 def _unusable(element: Element, what: str, hint: str | None = None) -> InputError:
-    return InputError(f"line {element.line}: {what}", code="unusable_mjcf", hint=hint)
+    return InputError(f"line {element.line}: {what}", code=Code.UNUSABLE_MJCF, hint=hint)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError, SolveError
 from handeye.types.arrays import BoolArray, FloatArray, finite_array
 from handeye.types.pose import Pose
@@ -90,15 +91,15 @@ class Arm:
         if not 1 <= len(names) <= MAX_JOINTS:
             raise InputError(
                 f"arm {self.name}: {len(names)} joints that move, expected 1 to {MAX_JOINTS}",
-                code="unusable_arm",
+                code=Code.UNUSABLE_ARM,
             )
         if len(set(names)) < len(names):
-            raise InputError(f"arm {self.name}: two joints of one name", code="unusable_arm")
+            raise InputError(f"arm {self.name}: two joints of one name", code=Code.UNUSABLE_ARM)
         for joint in self.joints:
             if not joint.velocity > 0:
                 raise InputError(
                     f"arm {self.name}: joint {joint.name}: a largest speed of {joint.velocity}",
-                    code="unusable_arm",
+                    code=Code.UNUSABLE_ARM,
                 )
         self._chain  # noqa: B018 - checks what the core checks
 
@@ -234,7 +235,7 @@ class Arm:
             raise SolveError(
                 f"arm {self.name} does not reach the pose within its joint limits: it comes within "
                 f"{metres * 1e3:.1f} mm and {np.rad2deg(radians):.2f} deg",
-                code="out_of_reach",
+                code=Code.OUT_OF_REACH,
                 hint="choose a pose nearer to the base, or another orientation",
             )
         return found[0]
@@ -283,7 +284,7 @@ class Arm:
             raise InputError(
                 f"arm {self.name}: joint positions of shape {array.shape}, expected (..., {len(self)}): "
                 + ", ".join(self.joint_names),
-                code="wrong_shape",
+                code=Code.WRONG_SHAPE,
             )
         return array.reshape(-1, len(self)), array.shape[:-1]
 

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import HandeyeError, InputError
 from handeye.robots.model import Arm
 from handeye.types.arrays import BoolArray, FloatArray
@@ -156,7 +157,7 @@ def arm_kinematics(arm: Arm, views: Sequence[View]) -> ArmKinematics:
     if not known:
         raise InputError(
             "no view has joint positions, which the arm's kinematics need",
-            code="no_joints",
+            code=Code.NO_JOINTS,
             hint="record the joint positions with every view, or leave out the arm",
         )
     for view in known:
@@ -164,7 +165,7 @@ def arm_kinematics(arm: Arm, views: Sequence[View]) -> ArmKinematics:
             raise InputError(
                 f"view {view.name}: {len(view.joints_rad or ())} joint positions, but arm {arm.name} has "
                 f"{len(arm)}: {', '.join(arm.joint_names)}",
-                code="wrong_arm",
+                code=Code.WRONG_ARM,
             )
     joints = np.array([view.joints_rad for view in known])
     reported = np.array([view.T_base_flange.matrix for view in known])
@@ -185,7 +186,7 @@ def arm_kinematics(arm: Arm, views: Sequence[View]) -> ArmKinematics:
         raise InputError(
             f"the reported poses are not those of arm {arm.name} at the reported joint positions: off by "
             f"{best[0] * 1e3:.0f} mm and {np.rad2deg(best[1]):.1f} deg",
-            code="wrong_arm",
+            code=Code.WRONG_ARM,
             hint="check the arm, the order and the units (radians) of the joints, and which link is the tip",
         )
     return kinematics

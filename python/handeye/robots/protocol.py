@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types import Pose
 
@@ -36,7 +37,7 @@ class Goal:
 
     def __post_init__(self) -> None:
         if not 0 < self.speed_rad_s < float("inf"):
-            raise InputError(f"speed {self.speed_rad_s} rad/s, expected above zero", code="out_of_range")
+            raise InputError(f"speed {self.speed_rad_s} rad/s, expected above zero", code=Code.OUT_OF_RANGE)
 
 
 @dataclass(frozen=True)

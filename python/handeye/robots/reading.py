@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.robots.model import Arm
 from handeye.robots.motion import AGREEMENT_M, AGREEMENT_RAD
@@ -19,7 +20,7 @@ from handeye.types.arrays import FloatArray, finite_array
 
 # Encoders may read this far beyond a limit at which the arm stands.
 LIMIT_TOLERANCE = 1e-3
-BAD_READING = "bad_reading"
+BAD_READING = Code.BAD_READING
 
 
 def typed_reading(answer: object) -> Reading:
@@ -79,7 +80,7 @@ def checked_reading(
         if joints_needed:
             raise DeviceError(
                 "the robot does not tell its joint positions, and without them no way can be checked",
-                code="no_joints",
+                code=Code.NO_JOINTS,
                 hint="return them in the Reading, in radians (metres for sliding joints)",
             )
         return reading

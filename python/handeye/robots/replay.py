@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.robots.protocol import Goal, Reading
 from handeye.types import Pose, View
@@ -41,7 +42,7 @@ class ReplayRobot:
             if is_near(view.T_base_flange, goal.T_base_flange):
                 self._at = view
                 return
-        raise DeviceError(f"{goal.label}: nothing was recorded there", code="motion_refused")
+        raise DeviceError(f"{goal.label}: nothing was recorded there", code=Code.MOTION_REFUSED)
 
     def read_pose(self) -> Reading:
         """Return the recorded pose.
@@ -53,7 +54,7 @@ class ReplayRobot:
         """
         view = self._at or next(iter(self._views), None)
         if view is None:
-            raise DeviceError("nothing was recorded", code="nothing_recorded")
+            raise DeviceError("nothing was recorded", code=Code.NOTHING_RECORDED)
         return Reading(view.T_base_flange, view.joints_rad)
 
     def stop(self) -> None:

@@ -4,6 +4,7 @@ import os
 from importlib import resources
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots.mjcf import parse_mjcf
 from handeye.robots.model import Arm
@@ -58,7 +59,7 @@ def open_arm(name_or_file: str | os.PathLike[str], *, base: str | None = None, t
         return _read(text, base, tip)
     raise InputError(
         f"no arm {text[:100]!r}",
-        code="unknown_arm",
+        code=Code.UNKNOWN_ARM,
         hint=f"the arms are {', '.join(names)}; or give a .urdf file",
     )
 
@@ -72,7 +73,7 @@ def _read(path: str, base: str | None, tip: str | None) -> Arm:
         if read_xml(content).tag != "mujoco":
             return parse_urdf(content, base=base, tip=tip)
         if base is not None:
-            raise InputError("the base of an arm in MJCF is the world", code="unknown_link")
+            raise InputError("the base of an arm in MJCF is the world", code=Code.UNKNOWN_LINK)
         return parse_mjcf(content, tip=tip)
     except InputError as error:
         raise InputError(f"{path}: {error.message}", code=error.code, hint=error.hint) from error

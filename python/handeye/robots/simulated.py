@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError, SolveError
 from handeye.robots.displaced import displaced, random_displacements
 from handeye.robots.model import Arm
@@ -51,7 +52,7 @@ class ArmErrors:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not 0 <= value < float("inf"):
-                raise InputError(f"{name} {value}, expected zero or more", code="out_of_range")
+                raise InputError(f"{name} {value}, expected zero or more", code=Code.OUT_OF_RANGE)
 
 
 class SimulatedArm:
@@ -78,7 +79,7 @@ class SimulatedArm:
 
     def __init__(self, arm: Arm, errors: ArmErrors, seed: int, start_rad: Sequence[float]) -> None:
         if not arm.within_limits(start_rad):
-            raise InputError(f"{arm.name}: the start is outside the joint limits", code="out_of_range")
+            raise InputError(f"{arm.name}: the start is outside the joint limits", code=Code.OUT_OF_RANGE)
         self._arm = arm
         self._errors = errors
         self._seed = seed
@@ -123,12 +124,12 @@ class SimulatedArm:
         if goal.joints_rad is not None:
             joints = np.array(goal.joints_rad, dtype=np.float64)
             if len(joints) != len(self._arm) or not self._arm.within_limits(joints):
-                raise DeviceError(f"{goal.label}: beyond the joint limits", code="motion_refused")
+                raise DeviceError(f"{goal.label}: beyond the joint limits", code=Code.MOTION_REFUSED)
             return joints
         try:
             return self._arm.inverse(goal.T_base_flange, self._commanded)
         except SolveError as error:
-            raise DeviceError(f"{goal.label}: {error.message}", code="motion_refused") from error
+            raise DeviceError(f"{goal.label}: {error.message}", code=Code.MOTION_REFUSED) from error
 
     def _stand(self, joints: FloatArray, before: FloatArray, label: str) -> Pose:
         errors = self._errors

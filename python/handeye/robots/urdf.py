@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots.model import Arm, Joint
 from handeye.robots.xml_tree import MAX_BYTES, Element, read_xml
@@ -84,11 +85,11 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
     file = Path(path)
     try:
         if not stat.S_ISREG(file.stat().st_mode):
-            raise InputError(f"{file}: not a regular file", code="unreadable")
+            raise InputError(f"{file}: not a regular file", code=Code.UNREADABLE)
         with file.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
-        code = "missing_file" if isinstance(error, FileNotFoundError) else "unreadable"
+        code = Code.MISSING_FILE if isinstance(error, FileNotFoundError) else Code.UNREADABLE
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{str(path)[:300]}: {reason or error}", code=code) from error
     return content
@@ -123,7 +124,7 @@ def parse_urdf(content: bytes, *, base: str | None = None, tip: str | None = Non
     if root.tag != "robot":
         raise InputError(
             f"line {root.line}: <{root.tag[:60]}>, expected <robot>",
-            code="not_urdf",
+            code=Code.NOT_URDF,
             hint="give a robot description in URDF",
         )
     # What xacro writes tells in comments how it was made.
@@ -131,7 +132,7 @@ def parse_urdf(content: bytes, *, base: str | None = None, tip: str | None = Non
     if b"${" in told or any(child.tag.startswith("xacro:") for child in root.children):
         raise InputError(
             "a xacro template, not a URDF",
-            code="not_urdf",
+            code=Code.NOT_URDF,
             hint="expand it first: xacro robot.urdf.xacro > robot.urdf",
         )
     links = links_of(root)
@@ -158,7 +159,7 @@ def links_of(root: Element) -> dict[str, Element]:
     if not links:
         raise unusable(root, "no <link>")
     if len(links) > MAX_LINKS:
-        raise InputError(f"{len(links)} links, expected at most {MAX_LINKS}", code="too_large")
+        raise InputError(f"{len(links)} links, expected at most {MAX_LINKS}", code=Code.TOO_LARGE)
     return links
 
 
@@ -220,7 +221,7 @@ def _root(links: dict[str, Element], by_child: dict[str, Edge]) -> str:
     if len(bearing) > 1:
         raise InputError(
             f"several links have no parent: {_names(bearing)}",
-            code="ambiguous_arm",
+            code=Code.AMBIGUOUS_ARM,
             hint="say which one is the base of the arm",
         )
     return bearing[0]
@@ -230,7 +231,7 @@ def _tip(links: dict[str, Element], by_child: dict[str, Edge], base: str) -> str
     moving = _moving_before(links, by_child, base)
     most = max(moving.values())
     if most == 0:
-        raise InputError(f"no joint that moves hangs on {base!r}", code="unusable_arm")
+        raise InputError(f"no joint that moves hangs on {base!r}", code=Code.UNUSABLE_ARM)
     last = [name for name, count in moving.items() if count == most]
     named = [name for wanted in TIP_NAMES for name in last if name == wanted or name.endswith(f"_{wanted}")]
     if named:
@@ -240,7 +241,7 @@ def _tip(links: dict[str, Element], by_child: dict[str, Edge], base: str) -> str
     if len(leaves) > 1:
         raise InputError(
             f"the arm could end in any of {_names(leaves)}",
-            code="ambiguous_arm",
+            code=Code.AMBIGUOUS_ARM,
             hint="say which link is the flange whose pose the robot reports",
         )
     return leaves[0] if leaves else last[-1]
@@ -281,7 +282,7 @@ def path_of(by_child: dict[str, Edge], base: str, tip: str) -> list[Edge]:
     if path is None:
         raise InputError(
             f"link {tip!r} does not hang on link {base!r}",
-            code="ambiguous_arm",
+            code=Code.AMBIGUOUS_ARM,
             hint="name a base above the tip",
         )
     return path
@@ -344,7 +345,7 @@ def _limits(edge: Edge, where: str) -> tuple[float, float, float]:
 
 def _no_link(name: str, links: dict[str, Element]) -> InputError:
     return InputError(
-        f"no link {name[:100]!r}", code="unknown_link", hint=f"the links are {_names(list(links))}"
+        f"no link {name[:100]!r}", code=Code.UNKNOWN_LINK, hint=f"the links are {_names(list(links))}"
     )
 
 

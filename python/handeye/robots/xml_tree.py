@@ -7,6 +7,7 @@ through external entities) is refused where it begins.
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
+from handeye.codes import Code
 from handeye.errors import InputError
 
 MAX_BYTES = 16 << 20
@@ -37,7 +38,7 @@ class Element:
         """
         found = self.all(tag)
         if len(found) > 1:
-            raise InputError(f"line {found[1].line}: a second <{tag}> in <{self.tag}>", code="invalid_xml")
+            raise InputError(f"line {found[1].line}: a second <{tag}> in <{self.tag}>", code=Code.INVALID_XML)
         return found[0] if found else None
 
 
@@ -51,7 +52,7 @@ def read_xml(content: bytes) -> Element:
         well-formed XML; the message says where.
     """
     if len(content) > MAX_BYTES:
-        raise InputError(f"{len(content)} bytes, expected at most {MAX_BYTES}", code="too_large")
+        raise InputError(f"{len(content)} bytes, expected at most {MAX_BYTES}", code=Code.TOO_LARGE)
     return _Reader().read(content)
 
 
@@ -76,13 +77,13 @@ class _Reader:
         except expat.ExpatError as error:
             raise InputError(
                 f"line {error.lineno}: {expat.ErrorString(error.code)}",
-                code="invalid_xml",
+                code=Code.INVALID_XML,
                 hint="the file is not well-formed XML; was it cut off or edited by hand?",
             ) from error
         except (ValueError, LookupError) as error:  # an encoding that expat or Python does not know
-            raise InputError(f"not readable as XML ({error})", code="invalid_xml") from error
+            raise InputError(f"not readable as XML ({error})", code=Code.INVALID_XML) from error
         if self.root is None:
-            raise InputError("no XML element", code="invalid_xml")
+            raise InputError("no XML element", code=Code.INVALID_XML)
         return self.root
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -91,7 +92,7 @@ class _Reader:
         if len(self.open) >= MAX_DEPTH or self.count > MAX_ELEMENTS:
             raise InputError(
                 f"line {line}: nested deeper than {MAX_DEPTH}, or more than {MAX_ELEMENTS} elements",
-                code="too_large",
+                code=Code.TOO_LARGE,
             )
         element = Element(tag, attributes, line)
         if self.open:
@@ -106,6 +107,6 @@ class _Reader:
     def _refuse(self, *_details: object) -> int:
         raise InputError(
             f"line {self.parser.CurrentLineNumber}: a document type or an entity",
-            code="unsafe_xml",
+            code=Code.UNSAFE_XML,
             hint="a robot description needs none: remove <!DOCTYPE ...> and what refers to it",
         )

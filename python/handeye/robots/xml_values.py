@@ -3,6 +3,7 @@
 import math
 import re
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots.xml_tree import Element
 from handeye.types.pose import Pose
@@ -86,4 +87,4 @@ def _spelled(element: Element, text: str, where: str) -> float:
 
 def unusable(element: Element, what: str, hint: str | None = None) -> InputError:
     """Return what to raise where an element cannot be used."""
-    return InputError(f"line {element.line}: {what}", code="unusable_urdf", hint=hint)
+    return InputError(f"line {element.line}: {what}", code=Code.UNUSABLE_URDF, hint=hint)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.extension import library
 
@@ -35,7 +36,7 @@ class RosLink:
 
     def __init__(self, name: str, clock: str = "system", threads: int = 1) -> None:
         if clock not in {"system", "sim"}:
-            raise InputError(f"clock {clock[:40]!r}, expected system or sim", code="bad_address")
+            raise InputError(f"clock {clock[:40]!r}, expected system or sim", code=Code.BAD_ADDRESS)
         self.rclpy = ros_library("rclpy")
         executors = ros_library("rclpy.executors")
         ros_library("rclpy.parameter")
@@ -47,7 +48,7 @@ class RosLink:
                 f"{name}_{secrets.token_hex(4)}", context=self._context, parameter_overrides=[simulated]
             )
         except Exception as error:
-            raise DeviceError(f"ROS 2 does not start: {error}", code="not_ready", hint=HINT) from error
+            raise DeviceError(f"ROS 2 does not start: {error}", code=Code.NOT_READY, hint=HINT) from error
         self._executor = (
             executors.SingleThreadedExecutor(context=self._context)
             if threads == 1
@@ -159,7 +160,7 @@ def options_of(address: str, first: str, known: Mapping[str, str]) -> dict[str, 
         elif not equals or key not in known or not value:
             raise InputError(
                 f"address {address[:80]!r}: {part[:40]!r}, expected {', '.join(f'{k}=...' for k in known)}",
-                code="bad_address",
+                code=Code.BAD_ADDRESS,
             )
         else:
             found[key] = value

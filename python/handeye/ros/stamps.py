@@ -7,11 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from handeye.codes import Code
 from handeye.errors import DeviceError
 
 # A clock that runs ahead of the one here by more, or a message that is on its way for longer, is refused.
 AHEAD_S, LATE_S = 0.05, 1.0
-BAD_STAMP = "bad_stamp"
+BAD_STAMP = Code.BAD_STAMP
 Value = TypeVar("Value")
 
 

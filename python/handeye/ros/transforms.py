@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.ros.stamps import Stream
 from handeye.types import Pose
@@ -86,7 +87,7 @@ class Transforms:
                     known = ", ".join(sorted({*self._above, *self._above.values()})[:30]) or "none"
                     raise DeviceError(
                         f"tf does not connect {base} with {tip}; the frames are {known}",
-                        code="unknown_frame",
+                        code=Code.UNKNOWN_FRAME,
                         hint="name two of them: ros2:ACTION,base=FRAME,flange=FRAME",
                     )
                 self._news.wait(left_s)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from handeye.cameras.protocol import BAD_FRAME, Frame, Grey, ImageSource, checked_frame
+from handeye.codes import Code
 from handeye.detection import Detection, NotFound, Prediction, Reason, detect
 from handeye.errors import DeviceError, HandeyeError, InputError
 from handeye.estimation.measurements import MIN_POINTS
@@ -54,7 +55,7 @@ class Timeouts:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not value > 0:
-                raise InputError(f"{name} {value}, expected above zero", code="out_of_range")
+                raise InputError(f"{name} {value}, expected above zero", code=Code.OUT_OF_RANGE)
 
     def without_clock(self) -> "Timeouts":
         """Return the same without limits of time: simulated drivers answer, and no clock is looked at."""
@@ -310,7 +311,7 @@ def _go(cell: Cell, goal: Goal, believed: Believed | None) -> Reading | Missed:
 
 def _after_failed_motion(cell: Cell, before: Reading, error: DeviceError) -> Missed:
     """Stop the arm, unless it only would not go, and see where it stands."""
-    detail, refused = error.message, error.code == "motion_refused"
+    detail, refused = error.message, error.code == Code.MOTION_REFUSED
     if not refused:
         stopped = cell.stop()
         if stopped is not None:
@@ -327,7 +328,7 @@ def _after_failed_motion(cell: Cell, before: Reading, error: DeviceError) -> Mis
 
 
 def _robot_failure(error: DeviceError) -> Failure:
-    return Failure.BAD_READING if error.code in {BAD_READING, "no_joints"} else Failure.ROBOT_FAILED
+    return Failure.BAD_READING if error.code in {BAD_READING, Code.NO_JOINTS} else Failure.ROBOT_FAILED
 
 
 def _not_there(cell: Cell, reading: Reading, believed: Believed | None) -> str | None:

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, HandeyeError, printable
 
 T = TypeVar("T")
@@ -47,7 +48,7 @@ class Calls:
         if not self._idle.wait(None if math.isinf(seconds) else seconds):
             raise DeviceError(
                 f"{self._what}: the last call has not come back",
-                code="busy",
+                code=Code.BUSY,
                 hint="check cable, power and network, and end the program that hangs",
             )
 
@@ -94,7 +95,7 @@ class Calls:
         except queue.Empty:
             raise DeviceError(
                 f"{self._what}: no answer within {seconds:g} s",
-                code="timeout",
+                code=Code.TIMEOUT,
                 hint="check cable, power and network",
             ) from None
         if good:
@@ -106,13 +107,15 @@ class Calls:
         described = in_our_words(error)
         if isinstance(error, DeviceError):
             return described
-        return DeviceError(f"{self._what}: {described.message}", code="driver_failed", hint=described.hint)
+        return DeviceError(f"{self._what}: {described.message}", code=Code.DRIVER_FAILED, hint=described.hint)
 
 
 def in_our_words(error: BaseException) -> DeviceError:
     """Return whatever a driver raised as an error of ours: short, and of characters that can be shown."""
     if not isinstance(error, HandeyeError):
-        return DeviceError(f"{type(error).__name__}: {printable(error, MAX_MESSAGE)}", code="driver_failed")
+        return DeviceError(
+            f"{type(error).__name__}: {printable(error, MAX_MESSAGE)}", code=Code.DRIVER_FAILED
+        )
     message = printable(error.args[0] if error.args else "", MAX_MESSAGE)
     hint = None if error.hint is None else printable(error.hint, MAX_MESSAGE)
     return DeviceError(message, code=printable(error.code, 60), hint=hint)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.session.journal import JOURNAL_FILE
 from handeye.types import Station, View
@@ -51,23 +52,23 @@ def check_same(
         raise InputError(
             f"{path}: holds {', '.join(more[:10])}, which no attempt in the journal took: it was cut "
             f"after {len(taken)} views",
-            code="journal_cut",
+            code=Code.JOURNAL_CUT,
             hint=f"restore {JOURNAL_FILE} from a copy; handeye solve uses the recording as it is",
         )
     if not same_header:
         raise InputError(
             f"{path}: name, source, mounting, camera or target are not those that the session began with",
-            code="edited",
+            code=Code.EDITED,
             hint="undo the change, or begin a new session",
         )
     for name, one in found.items():
         if isinstance(one, InputError):
-            if one.code != "missing_file":
+            if one.code != Code.MISSING_FILE:
                 raise one
         elif not same(one, known[name]):
             raise InputError(
                 f"{path}: view {name} is not as in the journal: its row or its corners were edited",
-                code="edited",
+                code=Code.EDITED,
                 hint="undo it, or delete the file of its corners: it is written again from the journal",
             )
 

@@ -9,6 +9,7 @@ import numpy as np
 from handeye.cameras.protocol import ImageSource, checked_frame
 from handeye.cameras.render import Appearance
 from handeye.cameras.simulated import Optics
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.importing import SourceOptions, open_folder
 from handeye.planning.solids import SolidLinks
@@ -77,7 +78,7 @@ def prepare(
     if configuration.robot is None:
         raise InputError(
             "no arm is named",
-            code="missing_value",
+            code=Code.MISSING_VALUE,
             hint=f"name it with --robot: {', '.join(shipped_arms())}, or its URDF or MJCF file",
         )
     arm = open_arm(configuration.robot)
@@ -89,7 +90,7 @@ def prepare(
         return _simulated(configuration, arm, target, confirm, solids, observer)
     if target is None:
         raise InputError(
-            "a real cell needs a target", code="missing_value", hint="name its file with --target"
+            "a real cell needs a target", code=Code.MISSING_VALUE, hint="name its file with --target"
         )
     workspace = configuration.workspace()
     person = person or Person(_nobody, lambda _: None)
@@ -235,7 +236,7 @@ def _safe(start: Start, cell: Cell) -> Start:
     if why is not None:
         raise InputError(
             f"the arm stands where it may not go: {why}",
-            code="unsafe_start",
+            code=Code.UNSAFE_START,
             hint="drive it to a free place, or state a workspace and a floor that are true",
         )
     return start
@@ -248,7 +249,7 @@ def _replayed(
     observer: Observer,
 ) -> Prepared:
     if configuration.images.partition(":")[0] != REPLAY:
-        raise InputError("a replayed robot needs the replayed camera", code="unknown_driver")
+        raise InputError("a replayed robot needs the replayed camera", code=Code.UNKNOWN_DRIVER)
     address = configuration.driver.partition(":")[2]
     opened = open_folder(address, SourceOptions(camera=camera))
     source = opened.recording
@@ -286,7 +287,7 @@ def _solids(configuration: Configuration, arm: Arm) -> SolidLinks | None:
     try:
         if configuration.robot in shipped_arms():
             raise InputError(
-                f"{configuration.robot}: the shipped description has no shapes", code="no_shapes"
+                f"{configuration.robot}: the shipped description has no shapes", code=Code.NO_SHAPES
             )
         return SolidLinks(arm, read_shapes(configuration.robot, arm))
     except InputError:
@@ -352,7 +353,7 @@ def _pictured_size(source: ImageSource, patience_s: float) -> tuple[int, int]:
     if frame.image is None:
         raise DeviceError(
             "the camera tells points without a picture, and its size is not known",
-            code="bad_frame",
+            code=Code.BAD_FRAME,
             hint="give its calibration with --camera",
         )
     height, width = frame.image.shape

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from handeye.cameras.protocol import ImageSource, checked_frame
+from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Reading, Robot
@@ -43,12 +44,12 @@ def check_at_rest(cell: Cell) -> None:
         return  # nothing moves by itself
     first, second = cell.read(), cell.read()
     if not is_near(first.T_base_flange, second.T_base_flange, REST_M, REST_RAD):
-        raise DeviceError("the arm moves before the session has begun", code="not_at_rest")
+        raise DeviceError("the arm moves before the session has begun", code=Code.NOT_AT_REST)
     why = cell.stop()
     if why is not None:
         raise DeviceError(
             f"the robot cannot be stopped, and so it is not moved: {why}",
-            code="stop_failed",
+            code=Code.STOP_FAILED,
             hint="stop() must work from any thread, also if nothing moves",
         )
 
@@ -110,7 +111,7 @@ def refusal(robot: Robot, unreachable: Goal) -> list[str]:
     try:
         calls.run(SECONDS, robot.move_to, unreachable)
     except DeviceError as error:
-        if error.code != "motion_refused":
+        if error.code != Code.MOTION_REFUSED:
             return [f"{unreachable.label}: refused with code {error.code!r}, expected 'motion_refused'"]
     else:
         return [f"{unreachable.label}: went, or says so, where it must refuse"]

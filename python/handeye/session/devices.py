@@ -5,6 +5,7 @@ from enum import StrEnum
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, printable
 from handeye.extension import CAMERAS as CAMERA_GROUP
 from handeye.extension import ROBOTS as ROBOT_GROUP
@@ -88,7 +89,7 @@ def _of_a_package(kind: str, point: EntryPoint) -> DriverReport:
         answer = Calls("driver").run(SECONDS, look)
         devices = tuple((printable(a, 80), printable(text, 120)) for a, text in answer)
     except DeviceError as error:
-        missing = error.code in {"library_missing", "no_camera"}
+        missing = error.code in {Code.LIBRARY_MISSING, Code.NO_CAMERA}
         state = DriverState.MISSING if missing else DriverState.BROKEN
         return DriverReport(kind, point.name, package, state, error.message, error.hint)
     except (TypeError, ValueError) as error:

@@ -14,6 +14,7 @@ from handeye.cameras.capture import Capture
 from handeye.cameras.folder import WatchedFolder
 from handeye.cameras.protocol import Grey, ImageSource
 from handeye.cameras.replay import ReplayCamera
+from handeye.codes import Code
 from handeye.datasets.images import read_image
 from handeye.errors import DeviceError, InputError
 from handeye.extension import CAMERAS as CAMERA_GROUP
@@ -91,7 +92,7 @@ def open_camera(spec: str, robot: Robot, person: Person, patience_s: float = 600
         return Capture(int(address) if address.isdecimal() else address)
     if name == REPLAY:
         if not isinstance(robot, ReplayRobot):
-            raise InputError("a replayed camera needs a replayed robot", code="unknown_driver")
+            raise InputError("a replayed camera needs a replayed robot", code=Code.UNKNOWN_DRIVER)
         return replayed_camera(open_folder(address), robot)
     return _announced(CAMERA_GROUP, name, address, CAMERAS, ImageSource)
 
@@ -110,7 +111,7 @@ def _announced(group: str, name: str, address: str, own: tuple[str, ...], kind: 
     if name not in found:
         raise InputError(
             f"no driver {name[:60]!r}, expected one of {', '.join([*own, *found])}",
-            code="unknown_driver",
+            code=Code.UNKNOWN_DRIVER,
             hint=f"a package with a driver announces it in the entry point group {group}",
         )
     try:

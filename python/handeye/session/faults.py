@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 
 from handeye.cameras.protocol import Frame, ImageSource, Points
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.robots.protocol import Goal, Reading, Robot
 
@@ -49,7 +50,7 @@ class FaultRates:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not 0 <= value <= 1:
-                raise InputError(f"{name} {value}, expected 0 to 1", code="out_of_range")
+                raise InputError(f"{name} {value}, expected 0 to 1", code=Code.OUT_OF_RANGE)
 
 
 class FaultyRobot:
@@ -64,7 +65,7 @@ class FaultyRobot:
         """Go there, or not."""
         random = _chance(self._seed, 5, goal.label)
         if random.uniform() < self._rates.refused:
-            raise DeviceError(f"{goal.label}: protective stop", code="motion_refused")
+            raise DeviceError(f"{goal.label}: protective stop", code=Code.MOTION_REFUSED)
         if random.uniform() < self._rates.robot_dies:
             raise ConnectionResetError("connection reset by peer")
         if random.uniform() < self._rates.off_target and goal.joints_rad is not None:
@@ -94,7 +95,7 @@ class FaultyCamera:
         """Take a picture, or something like it."""
         rates, random = self._rates, _chance(self._seed, 6, label)
         if random.uniform() < rates.camera_hangs:
-            raise DeviceError(f"{label}: no answer in time", code="timeout")
+            raise DeviceError(f"{label}: no answer in time", code=Code.TIMEOUT)
         if random.uniform() < rates.camera_fails:
             raise RuntimeError("grab failed (-1)")
         if random.uniform() < rates.stale and self._last is not None:

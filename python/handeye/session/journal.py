@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from handeye.codes import Code
 from handeye.datasets.reading import MIB, read_bytes, read_text, reason
 from handeye.errors import InputError, OutputError
 from handeye.session.entry import Entry
@@ -151,29 +152,29 @@ def read_settings(folder: Path) -> Settings:
     try:
         document: Any = json.loads(read_text(path, MAX_SETTINGS_BYTES))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not JSON: {str(error)[:200]}", code="not_json") from error
+        raise InputError(f"{path}: not JSON: {str(error)[:200]}", code=Code.NOT_JSON) from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:  # pyright: ignore[reportUnknownMemberType]
-        raise InputError(f"{path}: no session of ours", code="unknown_format")
+        raise InputError(f"{path}: no session of ours", code=Code.UNKNOWN_FORMAT)
     fields: dict[str, Any] = document  # pyright: ignore[reportUnknownVariableType]
     version = fields.get("version")
     if version not in {UNCHAINED_VERSION, VERSION} or isinstance(version, bool):
         raise InputError(
             f"{path}: version {str(version)[:60]}, this program reads up to {VERSION}",
-            code="newer_version",
+            code=Code.NEWER_VERSION,
             hint="update handeye",
         )
     asked, recording = fields.get("settings"), fields.get("recording")
     if not isinstance(asked, dict) or (version == VERSION and not isinstance(recording, dict)):
-        raise InputError(f"{path}: no settings", code="invalid_field")
+        raise InputError(f"{path}: no settings", code=Code.INVALID_FIELD)
     settings = Settings(asked, recording if version == VERSION else None, version)  # pyright: ignore[reportUnknownArgumentType]
     try:
         changed = version == VERSION and fields.get("digest") != settings.digest.hex()
     except (ValueError, RecursionError, TypeError) as error:
-        raise InputError(f"{path}: no settings: {str(error)[:200]}", code="invalid_field") from error
+        raise InputError(f"{path}: no settings: {str(error)[:200]}", code=Code.INVALID_FIELD) from error
     if changed:
         raise InputError(
             f"{path}: the settings were changed after the session began",
-            code="edited",
+            code=Code.EDITED,
             hint="undo the change, or begin a new session with other settings",
         )
     return settings
@@ -210,7 +211,7 @@ def read_journal(folder: Path, settings: Settings | None = None) -> Journal:
             raise InputError(
                 f"{path}: line {number} does not fit its checksum: it was changed, or lines before it were "
                 f"lost, put in or moved; {before}",
-                code="edited",
+                code=Code.EDITED,
                 hint="restore the file from a copy; handeye solve uses the recording without it",
             )
         entries.append(entry)
@@ -237,12 +238,12 @@ def _entry(body: bytes, where: str, number: int) -> Entry:
     try:
         data = json.loads(body)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{where}: not JSON: {str(error)[:200]}", code="not_json") from error
+        raise InputError(f"{where}: not JSON: {str(error)[:200]}", code=Code.NOT_JSON) from error
     entry = Entry.from_dict(data, where)
     if entry.number != number:
         raise InputError(
             f"{where}: attempt {entry.number}, expected {number}",
-            code="edited",
+            code=Code.EDITED,
             hint="restore the file from a copy; handeye solve uses the recording without it",
         )
     return entry

@@ -6,6 +6,7 @@ What happens next is a function of the journal and the seed alone: after a break
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
 from handeye.estimation.confidence import Within
@@ -137,7 +138,7 @@ class Session(Stepping[Situation, End]):
             The disk does not take it.
         """
         if name not in self.names:
-            raise InputError(f"view {name[:60]}: no view of this session", code="unknown_view")
+            raise InputError(f"view {name[:60]}: no view of this session", code=Code.UNKNOWN_VIEW)
         return self._withdraw(name, why)
 
     def _no_measurements(self) -> Measurements:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots import Arm
 from handeye.robots.simulated import SimulatedArm
@@ -58,7 +59,7 @@ class Prepared:
         """
         if self.cell.arm is None:
             raise InputError(
-                "the arm is not known", code="missing_value", hint="name it with its description"
+                "the arm is not known", code=Code.MISSING_VALUE, hint="name it with its description"
             )
         return self.cell.arm
 
@@ -74,7 +75,7 @@ class Prepared:
         if self.recorded is not None:
             return RecordedChooser(self.recorded, wish, cell.arm)
         if cell.workspace is None or self.start is None:
-            raise InputError("a workspace and where the arm stands are needed", code="missing_value")
+            raise InputError("a workspace and where the arm stands are needed", code=Code.MISSING_VALUE)
         limits = self.configuration.limits
         return ArmChooser(self.arm, cell.workspace, cell.camera, self.start, wish, limits, cell.solids)
 

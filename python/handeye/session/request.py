@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.lens_confidence import lens_within_px
 from handeye.planning import Stop, StopReason, StopRule
@@ -35,10 +36,10 @@ class Requested(StopRule):
         if not (self.translation_mm > 0 and self.rotation_deg > 0):
             raise InputError(
                 f"accuracy {self.translation_mm} mm and {self.rotation_deg} deg, expected above zero",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
             )
         if self.lens_px is not None and not self.lens_px > 0:
-            raise InputError(f"accuracy {self.lens_px} px, expected above zero", code="out_of_range")
+            raise InputError(f"accuracy {self.lens_px} px, expected above zero", code=Code.OUT_OF_RANGE)
 
     def verdict(self, state: State) -> Stop | None:
         """Stop once it is reached."""

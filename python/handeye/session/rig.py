@@ -5,6 +5,7 @@ Journal, lock, checks before and after every motion, and going on after a break 
 
 from dataclasses import dataclass
 
+from handeye.codes import Code
 from handeye.errors import DegenerateError, InputError
 from handeye.estimation import RigCalibration, RigEstimate, RigMeasurements, estimate_rig, solve_rig
 from handeye.estimation.faults import examine
@@ -73,7 +74,7 @@ class RigSession(Stepping[RigSituation, RigEnd]):
             The disk does not take it.
         """
         if name not in self.names:
-            raise InputError(f"station {name[:60]}: no station of this session", code="unknown_view")
+            raise InputError(f"station {name[:60]}: no station of this session", code=Code.UNKNOWN_VIEW)
         return self._withdraw(name, why)
 
     def end(self) -> RigEnd:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots import ArmKinematics, open_arm
 from handeye.robots.simulated import SimulatedArm
@@ -62,7 +63,7 @@ class RigPrepared:
         """
         cell, configuration = self.cell, self.configuration
         if cell.arm is None or cell.workspace is None:
-            raise InputError("an arm and a workspace are needed", code="missing_value")
+            raise InputError("an arm and a workspace are needed", code=Code.MISSING_VALUE)
         chooser = RigChooser(
             cell.arm,
             cell.workspace,

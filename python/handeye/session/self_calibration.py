@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.detection import CameraCalibration, Detection, calibrate_camera
 from handeye.errors import HandeyeError, InputError
 from handeye.types import Camera, Recording, Target, View
@@ -35,7 +36,7 @@ def nominal_camera(size_px: tuple[int, int], lens: str | None = None) -> Camera:
     if lens is not None and lens not in names:
         raise InputError(
             f"lens {lens!r}, expected one of {', '.join(names)}",
-            code="unknown_lens",
+            code=Code.UNKNOWN_LENS,
             hint="other lenses need a calibration of their own: give it with --camera",
         )
     model = lens or names[0]

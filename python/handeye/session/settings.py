@@ -9,6 +9,7 @@ from typing import Any, cast
 import msgspec
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation.work import Work
 from handeye.planning.collisions import Workspace
@@ -174,7 +175,7 @@ class Configuration:
         if self.workspace_m is None:
             raise InputError(
                 "no workspace is stated, and without one nothing moves",
-                code="no_workspace",
+                code=Code.NO_WORKSPACE,
                 hint="state the box that the flange may move in, in the frame of the robot's base",
             )
         lower, upper = self.workspace_m
@@ -258,6 +259,6 @@ def check_fingerprints(settings: Mapping[str, Any], found: Mapping[str, str]) ->
         if settings.get(name, fingerprint) != fingerprint:
             raise InputError(
                 f"{words[name]} is not what it was when the session began",
-                code="settings_changed",
+                code=Code.SETTINGS_CHANGED,
                 hint="undo the change, or begin a new session",
             )

@@ -6,6 +6,7 @@ import numpy as np
 
 from handeye.cameras.protocol import ImageSource
 from handeye.cameras.simulated import Optics, SimulatedCamera
+from handeye.codes import Code
 from handeye.errors import InputError, SolveError
 from handeye.planning.collisions import Body, Workspace
 from handeye.robots import Arm
@@ -155,7 +156,7 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
 
 def _lens(name: str) -> tuple[str, tuple[float, ...]]:
     if name not in LENSES:
-        raise InputError(f"lens {name!r}, expected one of {', '.join(LENSES)}", code="unknown_lens")
+        raise InputError(f"lens {name!r}, expected one of {', '.join(LENSES)}", code=Code.UNKNOWN_LENS)
     return LENSES[name]
 
 
@@ -193,7 +194,7 @@ def looking_down(arm: Arm, workspace: Workspace) -> tuple[Pose, tuple[float, ...
             return Pose(arm.forward(best)), tuple(best.tolist())
     raise SolveError(
         f"arm {arm.name}: no posture found with the flange down in front of it",
-        code="no_start",
+        code=Code.NO_START,
         hint="give the joints to start from",
     )
 

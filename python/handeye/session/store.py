@@ -19,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, Self, TypeVar
 
+from handeye.codes import Code
 from handeye.datasets import write_recording
 from handeye.datasets.reading import existing_folder, is_file, reason
 from handeye.datasets.recording_format import ViewsApart, read_views_apart
@@ -351,10 +352,10 @@ def _locked(path: Path) -> IO[bytes]:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
         file = os.fdopen(descriptor, "rb")
     except OSError as error:
-        raise InputError(f"{path}: {reason(error)}", code="missing_file") from error
+        raise InputError(f"{path}: {reason(error)}", code=Code.MISSING_FILE) from error
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         file.close()
-        raise InputError(f"{path}: not a regular file", code="unreadable")
+        raise InputError(f"{path}: not a regular file", code=Code.UNREADABLE)
     try:
         import fcntl  # noqa: PLC0415 - there is none on Windows
     except ImportError:
@@ -365,7 +366,7 @@ def _locked(path: Path) -> IO[bytes]:
         file.close()
         raise InputError(
             f"{path.parent}: another process works on this session",
-            code="in_use",
+            code=Code.IN_USE,
             hint="wait for it, or end it",
         ) from error
     return file

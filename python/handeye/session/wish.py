@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Measurements
 from handeye.estimation.work import Work
@@ -79,9 +80,9 @@ class Wish:
     def __post_init__(self) -> None:
         self.rules()  # checks what they check
         if self.seed < 0:
-            raise InputError(f"seed {self.seed}, expected zero or more", code="out_of_range")
+            raise InputError(f"seed {self.seed}, expected zero or more", code=Code.OUT_OF_RANGE)
         if not 0 < self.speed_rad_s < float("inf") or min(self.failures_in_a_row, self.tries_at_a_place) < 1:
-            raise InputError("a speed above zero and at least one attempt are needed", code="out_of_range")
+            raise InputError("a speed above zero and at least one attempt are needed", code=Code.OUT_OF_RANGE)
 
     def rules(self) -> tuple[StopRule, ...]:
         """Return when to stop, in the order asked."""

@@ -13,6 +13,7 @@ from functools import cache
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.detection import Detection, calibrate_camera
 from handeye.errors import SolveError
 from handeye.robots import Arm, open_arm
@@ -279,7 +280,7 @@ def draw_views(
             return np.array(joints[:count]), np.array(poses[:count])
     raise SolveError(
         f"{len(joints)} of {count} views found in {MOST_ATTEMPTS} attempts",
-        code="no_views",
+        code=Code.NO_VIEWS,
         hint="allow other distances or smaller tilts",
     )
 

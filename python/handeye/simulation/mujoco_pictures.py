@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.pattern import Pattern
 from handeye.types import Camera, Target
@@ -65,7 +66,7 @@ class MujocoPictures:
         except ImportError as error:
             raise InputError(
                 "the package mujoco is not installed",
-                code="missing_package",
+                code=Code.MISSING_PACKAGE,
                 hint="pip install 'handeye[sim]'; without a display set MUJOCO_GL=egl or osmesa",
             ) from error
         fx, fy, cx, cy = camera.parameters[:4]
@@ -74,7 +75,7 @@ class MujocoPictures:
         if not centred or np.any(camera.parameters[4:] != 0):
             raise InputError(
                 "MuJoCo's cameras are centred pinholes: no distortion, one focal length",
-                code="unsupported_camera",
+                code=Code.UNSUPPORTED_CAMERA,
             )
         fovy = float(np.rad2deg(2 * np.arctan(height / (2 * fy))))
         picture, low, high = _texture(target)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import SolveError
 from handeye.robots import Arm
 from handeye.simulation.cells import (
@@ -298,6 +299,6 @@ def draw_stations(
             return np.array(joints)
     raise SolveError(
         f"{len(joints)} of {options.stations} stations found in {MOST_DRAWS} attempts",
-        code="no_views",
+        code=Code.NO_VIEWS,
         hint="allow other distances or smaller tilts",
     )

@@ -13,6 +13,7 @@ import numpy as np
 
 from handeye import _core
 from handeye.cameras.render import Appearance, BoardRenderer
+from handeye.codes import Code
 from handeye.detection import Detection, detect
 from handeye.errors import InputError, SolveError
 from handeye.planning.collisions import Body, Workspace
@@ -79,7 +80,9 @@ class TwinOptions:
 
     def __post_init__(self) -> None:
         if self.training_views < 8 or self.validation_views < 2:
-            raise InputError("a twin needs 8 views to choose from and 2 to validate on", code="too_few_views")
+            raise InputError(
+                "a twin needs 8 views to choose from and 2 to validate on", code=Code.TOO_FEW_VIEWS
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +226,7 @@ def _postures(
         found += [q for q, why in zip(joints, body.obstacles(joints), strict=True) if why is None]
         if len(found) >= count:
             return np.array(found[:count])
-    raise SolveError(f"twin: {len(found)} of {count} views drawn", code="no_views")
+    raise SolveError(f"twin: {len(found)} of {count} views drawn", code=Code.NO_VIEWS)
 
 
 def _wrong_arm(

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, Workers, run_all
 from handeye.errors import SolveError
 from handeye.estimation import Estimate, Measurements
@@ -186,7 +187,7 @@ def made_cell(random: np.random.Generator, mounting: Mounting, count: int) -> tu
         found = _cell(random, mounting, count)
         if found is not None:
             return found
-    raise SolveError(f"no {count} views in {_CELLS} cells of {_TRIES} tries", code="no_views")
+    raise SolveError(f"no {count} views in {_CELLS} cells of {_TRIES} tries", code=Code.NO_VIEWS)
 
 
 def _cell(random: np.random.Generator, mounting: Mounting, count: int) -> tuple[Measurements, Pose] | None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, run_all
 from handeye.errors import InputError, SolveError
 from handeye.estimation import Estimate
@@ -64,7 +65,7 @@ class LoopOptions:
         if self.cells < 1 or self.added_views < 1 or self.seed < 0:
             raise InputError(
                 f"{self.cells} cells, {self.added_views} views, seed {self.seed}: expected at least 1, 1, 0",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
             )
 
     @property

@@ -12,6 +12,7 @@ import cv2
 
 import handeye
 from handeye import _core
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, run_all
 from handeye.datasets import read_recording, write_recording
 from handeye.errors import HandeyeError, InputError
@@ -40,9 +41,9 @@ def data_folder(given: Path | None = None) -> Path:
     folder = given or (Path(named) if named else None)
     hint = f"name the folder that holds {PUBLISHED}/{SIMULATED_SETS[0]} and so on, here or in {DATA_VARIABLE}"
     if folder is None:
-        raise InputError("no folder with data", code="no_data", hint=hint)
+        raise InputError("no folder with data", code=Code.NO_DATA, hint=hint)
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder", code="no_data", hint=hint)
+        raise InputError(f"{folder}: no such folder", code=Code.NO_DATA, hint=hint)
     return folder
 
 
@@ -59,7 +60,7 @@ def find_set(folder: Path, name: str) -> Path:
             return place
     raise InputError(
         f"{folder}: no set {name}, neither there nor in {PUBLISHED}",
-        code="no_data",
+        code=Code.NO_DATA,
         hint="give the folder that holds the sets, or the one above it",
     )
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, run_all
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Measurements, make_estimator
@@ -139,7 +140,7 @@ def demonstrate(
     if recording.truth is None or recording.truth.X is None:
         raise InputError(
             f"{recording.name}: no truth to compare with, expected [truth] with {recording.mounting.x_name}",
-            code="no_truth",
+            code=Code.NO_TRUTH,
         )
     protocol = Protocol(trials=starts, added_views=added_views, seed=seed)
     trials = draw_trials(recording, protocol)

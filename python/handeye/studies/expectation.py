@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, Workers, run_all
 from handeye.errors import HandeyeError, InputError, SolveError
 from handeye.estimation import Estimate
@@ -82,7 +83,7 @@ class Expectation:
         for level in self.levels:
             if level.views == views:
                 return level
-        raise InputError(f"{views} views: not among those asked for", code="out_of_range")
+        raise InputError(f"{views} views: not among those asked for", code=Code.OUT_OF_RANGE)
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ def expect(
     if cells < 1 or not views or min(views) < START_VIEWS:
         raise InputError(
             f"{cells} cells, {min(views, default=0)} views: expected at least 1 and {START_VIEWS}",
-            code="out_of_range",
+            code=Code.OUT_OF_RANGE,
         )
     numbers = tuple(sorted(set(views)))
     most = min(MEASURED, numbers[-1])
@@ -216,7 +217,7 @@ def _predicted(
     """Return the covariances (6, 6) that the planner predicts after more views."""
     configuration, workspace = prepared.configuration, prepared.cell.workspace
     if workspace is None:
-        raise InputError("a cell without a workspace", code="no_workspace")
+        raise InputError("a cell without a workspace", code=Code.NO_WORKSPACE)
     generator = Generator(prepared.arm, workspace, configuration.limits)
     drawn = generator.draw(estimate, postures, np.random.default_rng([configuration.seed, 9]))
     most = len(drawn.pool)

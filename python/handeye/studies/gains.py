@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, Workers, run_all
 from handeye.errors import HandeyeError, InputError
 from handeye.estimation import Estimate, Measurements, make_estimator
@@ -115,7 +116,7 @@ def study_gains(
     """
     if candidates < 3 or draws < 2:
         raise InputError(
-            f"{candidates} candidates, {draws} draws: expected at least 3 and 2", code="out_of_range"
+            f"{candidates} candidates, {draws} draws: expected at least 3 and 2", code=Code.OUT_OF_RANGE
         )
     jobs = [_Job(number, mounting, arm, model, candidates, draws, seed) for number in range(trials)]
     done = run_all(_run, jobs, workers=workers, progress=progress)

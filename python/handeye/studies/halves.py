@@ -5,6 +5,7 @@ from typing import Any
 
 import cv2
 
+from handeye.codes import Code
 from handeye.errors import HandeyeError, InputError
 from handeye.estimation import Measurements
 from handeye.studies.methods import methods
@@ -31,7 +32,7 @@ def study_halves(recording: Recording) -> dict[str, Any]:
     if count < FEWEST_VIEWS:
         raise InputError(
             f"{recording.name}: {count} usable views, at least {FEWEST_VIEWS} are needed",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
         )
     halves = [measurements.select(range(first, count, 2)) for first in range(2)]
     return {

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.compute.parallel import Progress
 from handeye.datasets import PosePair, PosePairs
 from handeye.datasets.bags.tracks import Track
@@ -158,13 +159,13 @@ def study_kinhec(
     except ImportError as error:
         raise InputError(
             "the package kinhec is not installed",
-            code="missing_package",
+            code=Code.MISSING_PACKAGE,
             hint="pip install 'handeye[public]', then: kinhec generate --tier small --out FOLDER",
         ) from error
     if not (root / "sequences.parquet").is_file():
         raise InputError(
             f"{root}: no sequences.parquet",
-            code="not_found",
+            code=Code.NOT_FOUND,
             hint="kinhec generate --tier small --out FOLDER writes a data set",
         )
     manifest = io.load_manifest(root, list(tracks))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, Workers, run_all
 from handeye.errors import SolveError
 from handeye.estimation import Estimate, Measurements, make_estimator
@@ -200,4 +201,4 @@ def _stand(
             if np.abs(short - np.eye(4)).max() < 1e-7:
                 return read
             read = arm.inverse_all((short @ arm.forward(read))[np.newaxis], read, attempts=1)[0][0]
-    raise SolveError(f"a corner was not reached in {_TRIES} tries", code="no_views")
+    raise SolveError(f"a corner was not reached in {_TRIES} tries", code=Code.NO_VIEWS)

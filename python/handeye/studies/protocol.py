@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import DegenerateError, InputError
 from handeye.types import Pose, Recording
 from handeye.types.arrays import FloatArray, IndexArray
@@ -56,11 +57,11 @@ class Protocol:
             raise InputError(
                 f"{self.trials} trials, {self.start_views} + {self.added_views} views, seed {self.seed}: "
                 "expected at least 1, 3, 0 and 0",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
             )
         if not 0 <= self.held_out_share < 1:
             raise InputError(
-                f"held-out share {self.held_out_share}, expected 0 to below 1", code="out_of_range"
+                f"held-out share {self.held_out_share}, expected 0 to below 1", code=Code.OUT_OF_RANGE
             )
 
 
@@ -123,7 +124,7 @@ def draw_trial(recording: Recording, protocol: Protocol, number: int) -> Trial:
         raise InputError(
             f"{recording.name}: {count} views, {held_out_count} of them held out, are too few for "
             f"{protocol.start_views} + {protocol.added_views}",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
         )
     random = trial_random(protocol.seed, recording.name, number)
     poses = np.array([view.T_base_flange.matrix for view in recording.views])
@@ -175,5 +176,5 @@ def true_hand_eye(recording: Recording) -> Pose:
         It is not known.
     """
     if recording.truth is None or recording.truth.X is None:
-        raise InputError(f"{recording.name}: no true hand-eye to compare with", code="no_truth")
+        raise InputError(f"{recording.name}: no true hand-eye to compare with", code=Code.NO_TRUTH)
     return recording.truth.X

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.compute.parallel import Progress
 from handeye.detection import Detection, detect
 from handeye.errors import SolveError
@@ -278,7 +279,7 @@ def draw_pool(one: CellCamera, random: np.random.Generator) -> Pool:
             found.append(Candidate(name, Pose(arm.forward(joints[k])), tuple(joints[k].tolist())))
         if len(found) >= POOL:
             return Pool(tuple(found[:POOL]))
-    raise SolveError(f"camera {one.name}: {len(found)} of {POOL} views in reach", code="no_views")
+    raise SolveError(f"camera {one.name}: {len(found)} of {POOL} views in reach", code=Code.NO_VIEWS)
 
 
 def _drawn(one: CellCamera, random: np.random.Generator) -> FloatArray:

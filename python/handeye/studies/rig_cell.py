@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from handeye.cameras.protocol import Frame, ImageSource, Points
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.planning.collisions import Body as ArmBody
 from handeye.planning.collisions import Workspace
@@ -68,7 +69,7 @@ def rig_cell(
     if configuration.robot not in {None, ARM}:
         raise InputError(
             f"the simulated rig has the arm {ARM}, not {configuration.robot}",
-            code="unknown_robot",
+            code=Code.UNKNOWN_ROBOT,
             hint="leave --robot out",
         )
     random = np.random.default_rng([seed, 11])
@@ -79,7 +80,7 @@ def rig_cell(
     if unknown:
         raise InputError(
             f"no camera {', '.join(sorted(unknown))[:100]}, expected some of {', '.join(rig.given)}",
-            code="unknown_camera",
+            code=Code.UNKNOWN_CAMERA,
         )
     names = [name for name in rig.given if asked.cameras is None or name in asked.cameras]
     targets = seen_targets(rig, names)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.compute.checkpoint import Checkpoint
 from handeye.compute.cluster import Cluster
 from handeye.compute.parallel import Workers
@@ -102,7 +103,7 @@ def study_scale(*, trials: int = 400, processes: int = 2, cluster: bool = True, 
         Fewer than 40 trials, or no package `distributed`.
     """
     if trials < 40:
-        raise InputError(f"{trials} trials, expected at least 40", code="out_of_range")
+        raise InputError(f"{trials} trials, expected at least 40", code=Code.OUT_OF_RANGE)
     growth = [(count, _timed(count, 1, seed)[1]) for count in (trials // 4, trials // 2)]
     alone, seconds = _timed(trials, 1, seed)
     growth.append((trials, seconds))
@@ -134,7 +135,7 @@ def _on_cluster(trials: int, workers: int, seed: int) -> tuple[Coverage, float]:
     except ImportError as error:
         raise InputError(
             "the package distributed is not installed",
-            code="missing_package",
+            code=Code.MISSING_PACKAGE,
             hint="pip install 'handeye[cluster]', or leave the cluster out with --no-cluster",
         ) from error
     made = distributed.LocalCluster(

@@ -13,6 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, Workers, part_of
 from handeye.datasets.images import read_image
 from handeye.errors import InputError
@@ -113,7 +114,7 @@ def with_opencv_corners(recording: Recording, place: Path) -> Recording:
     """
     target = recording.target
     if not isinstance(target, Chessboard):
-        raise InputError(f"{recording.name}: not a chessboard", code="unsupported_target")
+        raise InputError(f"{recording.name}: not a chessboard", code=Code.UNSUPPORTED_TARGET)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, MOST_STEPS, SMALL_STEP)
     views: list[View] = []
     for view in recording.views:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, Workers, run_all
 from handeye.errors import SolveError
 from handeye.estimation import Estimate, Measurements, make_estimator
@@ -241,7 +242,7 @@ def touched(
         errors.append(float(np.linalg.norm(landed - place)))
         radii.append(float(touch_error(estimate, one).radii_m[0]))
     raise SolveError(
-        f"{len(errors)} of {count} places seen and touched in {_TRIES * count} tries", code="no_views"
+        f"{len(errors)} of {count} places seen and touched in {_TRIES * count} tries", code=Code.NO_VIEWS
     )
 
 

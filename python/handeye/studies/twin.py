@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.compute.checkpoint import Checkpoint
 from handeye.compute.parallel import Progress, Workers, part_of, run_all
 from handeye.errors import InputError
@@ -119,7 +120,7 @@ def study_twin(
     if unknown or not models or sets < 1:
         raise InputError(
             f"models {', '.join(models)}, {sets} sets: expected some of {', '.join(MODELS)}, and a set",
-            code="out_of_range",
+            code=Code.OUT_OF_RANGE,
         )
     options = options or TwinOptions()
     protocol = Protocol(trials=trials, seed=seed)

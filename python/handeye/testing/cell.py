@@ -7,6 +7,7 @@ import numpy as np
 
 from handeye.cameras.protocol import Frame, Grey
 from handeye.cameras.simulated import Optics
+from handeye.codes import Code
 from handeye.datasets.toml_text import toml_text
 from handeye.errors import DeviceError
 from handeye.estimation import Measurements, paper_estimate
@@ -86,7 +87,7 @@ class MockCell:
             There are none, or they are beyond the limits; `code` is `motion_refused`.
         """
         if joints_rad is None:
-            raise DeviceError("nobody has found joints that reach this pose", code="motion_refused")
+            raise DeviceError("nobody has found joints that reach this pose", code=Code.MOTION_REFUSED)
         self._motions += 1
         goal = Goal(f"motion_{self._motions}.1", Pose(self.arm.forward(joints_rad)), joints_rad)
         self._hidden.move_to(goal)
@@ -105,7 +106,7 @@ class MockCell:
         """
         image = self.grab(label).image
         if image is None:
-            raise DeviceError("this camera gives points only", code="no_image")
+            raise DeviceError("this camera gives points only", code=Code.NO_IMAGE)
         return image
 
     def write(self, folder: Path) -> tuple[Path, Path]:
@@ -147,7 +148,7 @@ class MockCell:
             name = f"view_{len(taken) + 1:02d}"
             points = self.grab(f"{name}.1").points
             if points is None:
-                raise DeviceError("this camera gives pictures only", code="no_points")
+                raise DeviceError("this camera gives pictures only", code=Code.NO_POINTS)
             if len(points.point_ids) == self.target.point_count:
                 view = View(name, self.T_base_flange, points.point_ids, points.pixels)
                 taken.append(replace(view, joints_rad=self.joints_rad))

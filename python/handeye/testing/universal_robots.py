@@ -15,6 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.robots.drivers.rtde import (
     DATA,
@@ -264,7 +265,7 @@ class MockUniversalRobot:
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 given = {k.arg or "": value(k.value) for k in node.keywords}
                 return self._called(node.func.id, [value(a) for a in node.args], given, halted)
-            raise DeviceError(f"URScript that is not known here: {text[:80]}", code="bad_program")
+            raise DeviceError(f"URScript that is not known here: {text[:80]}", code=Code.BAD_PROGRAM)
 
         return value(ast.parse(text, mode="eval").body)
 
@@ -285,7 +286,7 @@ class MockUniversalRobot:
         elif name == "stopj":
             self._rate = np.zeros(6)
         else:
-            raise DeviceError(f"URScript function {name} is not known here", code="bad_program")
+            raise DeviceError(f"URScript function {name} is not known here", code=Code.BAD_PROGRAM)
         return None
 
     def _move(self, there: FloatArray, speed: float, acceleration: float, halted: threading.Event) -> None:

@@ -6,6 +6,7 @@ from typing import SupportsIndex
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from handeye.codes import Code
 from handeye.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +36,7 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
     """
     array = _numbers(values, what)
     if array.dtype.kind not in "iuf":
-        raise InputError(f"{what}: expected real numbers, found {array.dtype}", code="not_numbers")
+        raise InputError(f"{what}: expected real numbers, found {array.dtype}", code=Code.NOT_NUMBERS)
     _check_shape(array.shape, shape, what)
     frozen = np.array(array, dtype=np.float64, order="C")
     finite = np.isfinite(frozen)
@@ -44,7 +45,7 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
         entry = f"entry {where}" if where else "the value"
         raise InputError(
             f"{what}: {entry} is {frozen[tuple(where)]}, expected a finite number",
-            code="not_finite",
+            code=Code.NOT_FINITE,
             hint="remove the view or repair the file that the number came from",
         )
     frozen.flags.writeable = False
@@ -63,10 +64,12 @@ def index_array(values: ArrayLike, what: str) -> IndexArray:
     if array.size == 0:
         array = array.astype(np.int64)
     if array.dtype.kind not in "iu":
-        raise InputError(f"{what}: expected whole numbers, found {array.dtype}", code="not_numbers")
+        raise InputError(f"{what}: expected whole numbers, found {array.dtype}", code=Code.NOT_NUMBERS)
     _check_shape(array.shape, (None,), what)
     if array.size and (array.min() < 0 or array.max() > np.iinfo(np.int64).max):
-        raise InputError(f"{what}: {array.min()} to {array.max()}, expected 0 or more", code="out_of_range")
+        raise InputError(
+            f"{what}: {array.min()} to {array.max()}, expected 0 or more", code=Code.OUT_OF_RANGE
+        )
     frozen = np.array(array, dtype=np.int64, order="C")
     frozen.flags.writeable = False
     return frozen
@@ -85,9 +88,9 @@ def count(value: SupportsIndex, low: int, high: int, what: str) -> int:
     except TypeError:
         number = None
     if number is None or isinstance(value, bool):
-        raise InputError(f"{what}: {value!r}, expected a whole number", code="not_numbers")
+        raise InputError(f"{what}: {value!r}, expected a whole number", code=Code.NOT_NUMBERS)
     if not low <= number <= high:
-        raise InputError(f"{what}: {_short(number)}, expected {low} to {high}", code="out_of_range")
+        raise InputError(f"{what}: {_short(number)}, expected {low} to {high}", code=Code.OUT_OF_RANGE)
     return number
 
 
@@ -102,7 +105,7 @@ def positive(value: float, what: str) -> float:
     number = float(finite_array(value, (), what))
     if not 0.0 < number <= LARGEST:
         raise InputError(
-            f"{what}: {number}, expected a number above zero to {LARGEST:g}", code="out_of_range"
+            f"{what}: {number}, expected a number above zero to {LARGEST:g}", code=Code.OUT_OF_RANGE
         )
     return number
 
@@ -118,7 +121,7 @@ def deviations(values: ArrayLike, count: int, what: str) -> FloatArray:
     sigmas = finite_array(values, (count,), f"{what}: sigmas_px")
     if not (sigmas > 0).all():
         raise InputError(
-            f"{what}: sigmas_px: {sigmas.min():g}, expected numbers above zero", code="invalid_field"
+            f"{what}: sigmas_px: {sigmas.min():g}, expected numbers above zero", code=Code.INVALID_FIELD
         )
     return sigmas
 
@@ -127,7 +130,9 @@ def _numbers(values: ArrayLike, what: str) -> NDArray[np.generic]:
     try:
         return np.asarray(values)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise InputError(f"{what}: not numbers, or rows of different length", code="not_numbers") from error
+        raise InputError(
+            f"{what}: not numbers, or rows of different length", code=Code.NOT_NUMBERS
+        ) from error
 
 
 def _check_shape(found: tuple[int, ...], expected: tuple[int | None, ...], what: str) -> None:
@@ -136,7 +141,7 @@ def _check_shape(found: tuple[int, ...], expected: tuple[int | None, ...], what:
     )
     if not fits:
         wanted = "(" + ", ".join("N" if want is None else str(want) for want in expected) + ")"
-        raise InputError(f"{what}: shape {found}, expected {wanted}", code="wrong_shape")
+        raise InputError(f"{what}: shape {found}, expected {wanted}", code=Code.WRONG_SHAPE)
 
 
 def _short(number: int) -> str:

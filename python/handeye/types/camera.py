@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import LARGEST, FloatArray, count, finite_array
 from handeye.types.plain import Document, read_document, without_none
@@ -88,18 +89,20 @@ class Camera:
         names = LENSES.get(lens)
         if names is None:
             raise InputError(
-                f"camera: lens {lens!r}, expected one of {', '.join(LENSES)}", code="unknown_lens"
+                f"camera: lens {lens!r}, expected one of {', '.join(LENSES)}", code=Code.UNKNOWN_LENS
             )
         values = finite_array(parameters, (None,), "camera: parameters")
         if len(values) != len(names):
             raise InputError(
                 f"camera: {len(values)} parameters for {lens}, expected {len(names)}: {', '.join(names)}",
-                code="wrong_shape",
+                code=Code.WRONG_SHAPE,
             )
         if np.abs(values).max() > LARGEST:
-            raise InputError(f"camera: a parameter of {np.abs(values).max():.3g}", code="out_of_range")
+            raise InputError(f"camera: a parameter of {np.abs(values).max():.3g}", code=Code.OUT_OF_RANGE)
         if min(values[:2]) <= 0:
-            raise InputError(f"camera: focal lengths {values[:2]}, expected above zero", code="out_of_range")
+            raise InputError(
+                f"camera: focal lengths {values[:2]}, expected above zero", code=Code.OUT_OF_RANGE
+            )
         _set(self, "lens", lens)
         _set(self, "parameters", values)
         _set(self, "width_px", count(width_px, 1, MAX_IMAGE_SIDE_PX, "camera: width_px"))
@@ -131,7 +134,7 @@ class Camera:
         expected = np.array([[matrix[0, 0], 0, matrix[0, 2]], [0, matrix[1, 1], matrix[1, 2]], [0, 0, 1]])
         if not np.allclose(matrix, expected, rtol=0, atol=1e-9):
             raise InputError(
-                "camera matrix: expected fx 0 cx / 0 fy cy / 0 0 1 (no skew)", code="invalid_field"
+                "camera matrix: expected fx 0 cx / 0 fy cy / 0 0 1 (no skew)", code=Code.INVALID_FIELD
             )
         raw = np.zeros(0) if distortion is None else np.ravel(np.asarray(distortion))
         coefficients = finite_array(raw, (None,), "distortion")
@@ -145,7 +148,7 @@ class Camera:
             wanted = "4 for a fisheye" if fisheye else "0, 4, 5, 8 or 12"
             raise InputError(
                 f"distortion: {len(coefficients)} coefficients, expected {wanted}",
-                code="unknown_lens",
+                code=Code.UNKNOWN_LENS,
                 hint="calibrate the camera with one of these lens models",
             )
         head = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]
@@ -250,7 +253,7 @@ def _covariance(values: ArrayLike, n: int) -> FloatArray:
     covariance = finite_array(values, (n, n), "camera: covariance")
     scale = float(np.abs(covariance).max())
     if not np.allclose(covariance, covariance.T, rtol=0, atol=1e-9 * scale):
-        raise InputError("camera: covariance is not symmetric", code="invalid_field")
+        raise InputError("camera: covariance is not symmetric", code=Code.INVALID_FIELD)
     # Scaled to a correlation first: pixels squared and squared coefficients differ by ten orders of
     # magnitude.
     deviations = np.sqrt(np.clip(np.diag(covariance), 0, None))
@@ -259,5 +262,5 @@ def _covariance(values: ArrayLike, n: int) -> FloatArray:
         correlation = covariance / scales / scales[:, np.newaxis]
     usable = np.diag(covariance).min() >= 0 and bool(np.isfinite(correlation).all())
     if not usable or np.linalg.eigvalsh(correlation).min() < -1e-6:
-        raise InputError("camera: covariance is not positive semidefinite", code="invalid_field")
+        raise InputError("camera: covariance is not positive semidefinite", code=Code.INVALID_FIELD)
     return covariance

@@ -4,6 +4,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from handeye.codes import Code
 from handeye.errors import InputError
 
 T = TypeVar("T")
@@ -35,9 +36,9 @@ def read_document(data: object, kind: type[T], what: str, *, lax: bool = False) 
     try:
         return msgspec.convert(data, kind, strict=not lax)
     except msgspec.ValidationError as error:
-        raise InputError(f"{what}: {_readable(str(error))}", code="invalid_field") from error
+        raise InputError(f"{what}: {_readable(str(error))}", code=Code.INVALID_FIELD) from error
     except (OverflowError, RecursionError, ValueError) as error:
-        raise InputError(f"{what}: unusable value ({error})", code="invalid_field") from error
+        raise InputError(f"{what}: unusable value ({error})", code=Code.INVALID_FIELD) from error
 
 
 def _readable(message: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import LARGEST, FloatArray, finite_array
 
@@ -55,11 +56,11 @@ class Pose:
         given = finite_array(matrix, (4, 4), "pose")
         farthest = float(np.abs(given[:3, 3]).max())
         if farthest > LARGEST:
-            raise InputError(f"pose: a translation of {farthest:.3g} m", code="out_of_range")
+            raise InputError(f"pose: a translation of {farthest:.3g} m", code=Code.OUT_OF_RANGE)
         if np.abs(given[:3, :3]).max() < 2 and np.linalg.det(given[:3, :3]) < 0:
             raise InputError(
                 "pose: a mirrored (left-handed) frame is not a rigid transform",
-                code="not_rigid",
+                code=Code.NOT_RIGID,
                 hint="check the order and the signs of the axes",
             )
         if not _is_rigid(given):
@@ -130,7 +131,7 @@ class Pose:
         if not abs(norm - 1.0) <= QUATERNION_NORM_TOLERANCE:
             raise InputError(
                 f"quaternion: norm {norm:.6g}, expected 1",
-                code="not_rigid",
+                code=Code.NOT_RIGID,
                 hint="give the quaternion as x, y, z, w with unit norm",
             )
         x, y, z, w = quaternion / norm

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, finite_array
 from handeye.types.pose import Pose
@@ -40,7 +41,7 @@ class Tip:
         finite_array(self.at_m, (3,), "tip")
         if not 0 <= self.sigma_m < float("inf"):
             raise InputError(
-                f"tip: standard deviation {self.sigma_m} m, expected zero or more", code="out_of_range"
+                f"tip: standard deviation {self.sigma_m} m, expected zero or more", code=Code.OUT_OF_RANGE
             )
 
 
@@ -90,10 +91,10 @@ class Probing:
 
     def __post_init__(self) -> None:
         if not self.touches:
-            raise InputError("no touch", code="no_touches", hint="touch three corners of the board")
+            raise InputError("no touch", code=Code.NO_TOUCHES, hint="touch three corners of the board")
         if not 0 < self.sigma_m < float("inf"):
             raise InputError(
-                f"touches: standard deviation {self.sigma_m} m, expected above zero", code="out_of_range"
+                f"touches: standard deviation {self.sigma_m} m, expected above zero", code=Code.OUT_OF_RANGE
             )
         for number, touch in enumerate(self.touches, start=1):
             names = [touch.tip, *([touch.point] if isinstance(touch.point, str) else [])]
@@ -101,14 +102,14 @@ class Probing:
                 if name not in self.tips:
                     raise InputError(
                         f"touch {number}: no tip {name[:80]!r}",
-                        code="unknown_tip",
+                        code=Code.UNKNOWN_TIP,
                         hint=f"tips are {', '.join(self.tips)}",
                     )
             bodies = [self.tips[name].body for name in names]
             if len(bodies) > 1 and bodies[0] is bodies[1]:
                 raise InputError(
                     f"touch {number}: both points are on the {bodies[0].value}",
-                    code="same_body",
+                    code=Code.SAME_BODY,
                     hint="one of them moves with the flange, the other stands still",
                 )
 
@@ -126,12 +127,12 @@ class Probing:
             if not 0 <= touch.point < points:
                 raise InputError(
                     f"touch {number}: point {touch.point} of a board with points 0 to {points - 1}",
-                    code="unknown_point",
+                    code=Code.UNKNOWN_POINT,
                 )
             if self.tips[touch.tip].body is body:
                 raise InputError(
                     f"touch {number}: the board and tip {touch.tip} are both on the {body.value}",
-                    code="same_body",
+                    code=Code.SAME_BODY,
                     hint="a board on the flange is touched with a tip that stands still",
                 )
 
@@ -147,7 +148,7 @@ class Probing:
             if touch.joints_rad is None or len(touch.joints_rad) != count:
                 raise InputError(
                     f"touch {number}: {len(touch.joints_rad or ())} joint positions, the arm has {count}",
-                    code="no_joints",
+                    code=Code.NO_JOINTS,
                     hint="write down the joints at every touch, or leave out --robot",
                 )
         return np.array([touch.joints_rad for touch in self.touches], dtype=float)

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.camera import Camera
 from handeye.types.mounting import Mounting
@@ -53,7 +54,7 @@ class Truth:
 
     def __post_init__(self) -> None:
         if self.X is None and self.Y is None:
-            raise InputError("truth: expected X, Y or both", code="invalid_field")
+            raise InputError("truth: expected X, Y or both", code=Code.INVALID_FIELD)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON or TOML; `from_dict` reads them back."""
@@ -122,12 +123,12 @@ class Recording:
         if not 0 < len(self.name) <= MAX_NAME_LENGTH or not self.name.isprintable():
             raise InputError(
                 f"recording: name {self.name[:50]!r}, expected one line of 1 to {MAX_NAME_LENGTH} characters",
-                code="invalid_name",
+                code=Code.INVALID_NAME,
             )
         if len(self.source) > MAX_SOURCE_LENGTH or not self.source.replace("\n", "").isprintable():
             raise InputError(
                 f"recording: source, expected text of at most {MAX_SOURCE_LENGTH} characters",
-                code="invalid_field",
+                code=Code.INVALID_FIELD,
             )
         object.__setattr__(self, "mounting", Mounting(self.mounting))
         object.__setattr__(self, "views", tuple(self.views))
@@ -137,7 +138,7 @@ class Recording:
             if view.name.lower() in seen:
                 raise InputError(
                     f"view {view.name}: the name is there twice",
-                    code="duplicate_view",
+                    code=Code.DUPLICATE_VIEW,
                     hint="rename one of them",
                 )
             seen.add(view.name.lower())
@@ -158,7 +159,7 @@ class Recording:
         for view in self.views:
             if view.name == name:
                 return view
-        raise InputError(f"view {name!r}: not in recording {self.name}", code="unknown_view")
+        raise InputError(f"view {name!r}: not in recording {self.name}", code=Code.UNKNOWN_VIEW)
 
     def select(self, names: Iterable[str]) -> "Recording":
         """Return the recording with the views of these names, in the order given.
@@ -220,7 +221,7 @@ def check_points(view: View, target: Target) -> None:
         raise InputError(
             f"view {view.name}: point {largest}, but the {target.family} has {target.point_count} points "
             f"(0 to {target.point_count - 1})",
-            code="point_out_of_range",
+            code=Code.POINT_OUT_OF_RANGE,
             hint="check the size of the pattern",
         )
 
@@ -232,6 +233,6 @@ def _check_inside(view: View, camera: Camera) -> None:
         raise InputError(
             f"view {view.name}: pixels u {low[0]:.1f} to {high[0]:.1f}, v {low[1]:.1f} to {high[1]:.1f}, "
             f"but the image has {camera.width_px} x {camera.height_px} pixels",
-            code="pixel_outside",
+            code=Code.PIXEL_OUTSIDE,
             hint="check that the camera's width_px and height_px belong to these images",
         )

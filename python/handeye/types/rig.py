@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from itertools import combinations, groupby, product
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.camera import Camera
 from handeye.types.mounting import Mounting
@@ -113,13 +114,13 @@ class Station:
     def __post_init__(self) -> None:
         object.__setattr__(self, "views", tuple(self.views))
         if not self.views:
-            raise InputError("a station without views", code="no_points")
+            raise InputError("a station without views", code=Code.NO_POINTS)
         seen: set[tuple[str, str]] = set()
         for one in self.views:
             if (one.camera, one.target) in seen:
                 raise InputError(
                     f"station {self.name}: camera {one.camera} saw target {one.target} twice",
-                    code="duplicate_view",
+                    code=Code.DUPLICATE_VIEW,
                 )
             seen.add((one.camera, one.target))
             for what in ("name", "T_base_flange", "joints_rad", "timestamp_s"):
@@ -127,7 +128,7 @@ class Station:
                     raise InputError(
                         f"station {self.name}: camera {one.camera} has another {what} than "
                         f"{self.views[0].camera}",
-                        code="invalid_field",
+                        code=Code.INVALID_FIELD,
                         hint="the views of a station are taken at one stop of the arm",
                     )
 
@@ -201,13 +202,13 @@ class RigRecording:
     def __post_init__(self) -> None:
         object.__setattr__(self, "stations", tuple(self.stations))
         if not self.cameras or not self.targets:
-            raise InputError("a recording needs a camera and a target", code="invalid_field")
+            raise InputError("a recording needs a camera and a target", code=Code.INVALID_FIELD)
         for what, names in (("camera", self.cameras), ("target", self.targets)):
             for name in names:
                 if not _NAME.fullmatch(name):
                     raise InputError(
                         f"{what} {name[:60]!r}: expected a name of 1 to 40 letters, digits, '_' or '-'",
-                        code="invalid_name",
+                        code=Code.INVALID_NAME,
                     )
         for station in self.stations:
             for one in station.views:
@@ -219,7 +220,7 @@ class RigRecording:
                         raise InputError(
                             f"station {station.name}: no {what} {name[:60]!r}, expected one of "
                             f"{', '.join(known)}",
-                            code="invalid_field",
+                            code=Code.INVALID_FIELD,
                         )
         # The views of a pair are held to the rules of a recording: names, points and pixels.
         for camera, target in self.pairs:
@@ -228,7 +229,7 @@ class RigRecording:
         for name in names:
             if names.count(name) > 1:
                 raise InputError(
-                    f"station {name}: the name is there twice", code="duplicate_view", hint="rename one"
+                    f"station {name}: the name is there twice", code=Code.DUPLICATE_VIEW, hint="rename one"
                 )
 
     def __len__(self) -> int:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, finite_array
 
@@ -39,7 +40,7 @@ class WorkBox:
         if (lower >= upper).any():
             raise InputError(
                 f"box of work: from {lower * _MM_PER_M} to {upper * _MM_PER_M} mm, expected the lower first",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
                 hint="give the least x y z, then the largest x y z",
             )
 

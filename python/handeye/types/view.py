@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, IndexArray, deviations, finite_array, index_array
 from handeye.types.plain import Document, read_document, without_none
@@ -33,7 +34,7 @@ def check_view_name(name: str) -> str:
         raise InputError(
             f"view name {name[:120]!r}: expected 1 to 100 letters, digits, '_', '-' or '.', "
             "beginning with one of the first three, and no name that a system reserves",
-            code="invalid_name",
+            code=Code.INVALID_NAME,
             hint="rename the view, for example view_01",
         )
     return name
@@ -57,7 +58,7 @@ def check_relative_path(path: str, what: str) -> str:
     ):
         raise InputError(
             f"{what}: path {path[:120]!r}, expected a path below the folder, with '/' and without '..'",
-            code="path_outside",
+            code=Code.PATH_OUTSIDE,
             hint="put the file into the folder and name it relative to it",
         )
     return path
@@ -140,20 +141,20 @@ class View:
         if len(ids) == 0:
             raise InputError(
                 f"{where}: no points",
-                code="no_points",
+                code=Code.NO_POINTS,
                 hint="leave out views in which the target was not found",
             )
         values = finite_array(pixels, (None, 2), f"{where}: pixels")
         if len(ids) != len(values):
             raise InputError(
                 f"{where}: {len(ids)} point ids but {len(values)} pixels, expected as many",
-                code="wrong_shape",
+                code=Code.WRONG_SHAPE,
             )
         unique, counts = np.unique(ids, return_counts=True)
         if len(unique) < len(ids):
             raise InputError(
                 f"{where}: point {unique[counts > 1][0]} is there {counts.max()} times, expected once",
-                code="duplicate_point",
+                code=Code.DUPLICATE_POINT,
             )
         _set(self, "name", name)
         _set(self, "T_base_flange", T_base_flange)
@@ -216,5 +217,5 @@ def _set(view: View, name: str, value: object) -> None:
 def _joints(values: Sequence[float], where: str) -> tuple[float, ...]:
     joints = finite_array(values, (None,), f"{where}: joints_rad")
     if not 1 <= len(joints) <= MAX_JOINTS:
-        raise InputError(f"{where}: {len(joints)} joints, expected 1 to {MAX_JOINTS}", code="wrong_shape")
+        raise InputError(f"{where}: {len(joints)} joints, expected 1 to {MAX_JOINTS}", code=Code.WRONG_SHAPE)
     return tuple(joints.tolist())

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.robots.protocol import Goal
 from handeye.session import Step
@@ -139,5 +140,5 @@ def _meant(values: dict[str, object], session: Stepping[Any, E]) -> str:
     if name is None and session.names:
         return session.names[-1]
     if not isinstance(name, str):
-        raise InputError("there is no view to take back", code="unknown_view")
+        raise InputError("there is no view to take back", code=Code.UNKNOWN_VIEW)
     return name

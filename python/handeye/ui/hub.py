@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from handeye.codes import Code
 from handeye.errors import HandeyeError, InputError
 
 # Everything that a page can ask for. The session obeys all but `stop`, which is obeyed at once.
@@ -114,7 +115,7 @@ class Hub:
         with self._changed:
             section = self._sections.get(name)
         if section is None:
-            raise InputError(f"no document {name[:40]!r}", code="unknown_document")
+            raise InputError(f"no document {name[:40]!r}", code=Code.UNKNOWN_DOCUMENT)
         if section.built is None:
             body = {"version": section.version, "data": section.build()}
             section.built = msgspec.json.encode(body)
@@ -135,12 +136,12 @@ class Hub:
             An unknown action, or a page that does not drive.
         """
         if command.action not in ACTIONS:
-            raise InputError(f"no action {command.action[:40]!r}", code="unknown_action")
+            raise InputError(f"no action {command.action[:40]!r}", code=Code.UNKNOWN_ACTION)
         if command.action == "stop":
             self._stopped()
             return
         if page != self._driver:
-            raise InputError("this page looks on; another one drives", code="not_driving")
+            raise InputError("this page looks on; another one drives", code=Code.NOT_DRIVING)
         if command.action == "answer":
             self._answered(command)
         else:
@@ -191,10 +192,10 @@ class Hub:
     def _answered(self, command: Command) -> None:
         question = self._question
         if question is None or command.values.get("id") != question["id"]:
-            raise InputError("the question is not open any more", code="late_answer")
+            raise InputError("the question is not open any more", code=Code.LATE_ANSWER)
         text = command.values.get("text")
         if not isinstance(text, str) or len(text) > 20_000:
-            raise InputError("an answer is a text of at most 20000 characters", code="wrong_type")
+            raise InputError("an answer is a text of at most 20000 characters", code=Code.WRONG_TYPE)
         self._answers.put(text)
 
     def _talk(self) -> dict[str, Any]:
@@ -212,7 +213,7 @@ class Hub:
         """
         with self._changed:
             if sum(self._watchers.values()) >= MOST_WATCHERS:
-                raise InputError(f"{MOST_WATCHERS} pages look on already", code="too_many")
+                raise InputError(f"{MOST_WATCHERS} pages look on already", code=Code.TOO_MANY)
             self._watchers[page] = self._watchers.get(page, 0) + 1
             absent = self._driver not in self._watchers and time.monotonic() - self._driver_left > ABSENT_S
             if self._driver is None or absent:
@@ -241,7 +242,7 @@ class Hub:
         """
         with self._changed:
             if page not in self._watchers:
-                raise InputError("this page does not look on", code="not_watching")
+                raise InputError("this page does not look on", code=Code.NOT_WATCHING)
             self._driver = page
         self.say("Another page drives now.")
         self.publish("people", self._people)

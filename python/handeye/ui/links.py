@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots import Arm, shipped_arms
 from handeye.robots.shapes import Shape, read_shapes
@@ -105,12 +106,12 @@ def _link(shape: Shape) -> Link:
         try:
             mesh = trimesh.load(shape.file, force="mesh")
         except Exception as error:
-            raise InputError(f"{shape.file}: no mesh: {error}", code="unusable_mesh") from error
+            raise InputError(f"{shape.file}: no mesh: {error}", code=Code.UNUSABLE_MESH) from error
     scale = shape.size if shape.kind == "mesh" else (1.0, 1.0, 1.0)
     vertices = np.asarray(mesh.vertices, dtype=np.float64) * scale
     faces = np.asarray(mesh.faces, dtype=np.int64)
     if not np.isfinite(vertices).all() or len(faces) == 0:
-        raise InputError(f"link {shape.link}: a mesh without faces", code="unusable_mesh")
+        raise InputError(f"link {shape.link}: a mesh without faces", code=Code.UNUSABLE_MESH)
     vertices, faces = coarser(vertices, faces, MERGED_M if shape.kind == "mesh" else 0.0)
     return Link(shape.frame, shape.placement.act(vertices), faces)
 

@@ -18,6 +18,7 @@ from importlib.resources import files
 from typing import Any, Protocol, cast
 from urllib.parse import parse_qs, unquote, urlsplit
 
+from handeye.codes import Code
 from handeye.errors import HandeyeError, InputError, OutputError
 from handeye.ui.hub import Command, Hub, described
 
@@ -90,7 +91,7 @@ class Server:
         except (OSError, OverflowError) as error:
             raise OutputError(
                 f"the page cannot be served at {host}:{port}: {error}",
-                code="address",
+                code=Code.ADDRESS,
                 hint="choose another --ui-port, or an address of this machine",
             ) from error
         self._server.owner = self
@@ -239,13 +240,13 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             asked: Any = json.loads(body)
         except (ValueError, RecursionError) as error:
-            raise InputError(f"not JSON: {str(error)[:200]}", code="not_json") from error
+            raise InputError(f"not JSON: {str(error)[:200]}", code=Code.NOT_JSON) from error
         if not isinstance(asked, dict):
-            raise InputError("a command is an object", code="wrong_type")
+            raise InputError("a command is an object", code=Code.WRONG_TYPE)
         values = cast("dict[str, Any]", asked)
         page, action = values.pop("page", None), values.pop("action", None)
         if not isinstance(page, str) or not isinstance(action, str):
-            raise InputError("a command has a page and an action", code="wrong_type")
+            raise InputError("a command has a page and an action", code=Code.WRONG_TYPE)
         if action == "take_over":
             self._owner.hub.take_over(page)
         else:
@@ -254,7 +255,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _picture(self, body: bytes) -> None:
         if self._owner.upload is None:
-            raise InputError("no picture is waited for here", code="no_upload")
+            raise InputError("no picture is waited for here", code=Code.NO_UPLOAD)
         said = self._owner.upload(body)
         self._owner.hub.say(said)
         self._send(json.dumps({"said": said}).encode(), "application/json")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import DegenerateError, InputError
 from handeye.estimation import Estimate, Measurements
 from handeye.estimation.f_distribution import f_quantile
@@ -59,7 +60,7 @@ def held_out_rmse_px(estimate: Estimate, held_out: Measurements) -> float:
         Fewer than two views.
     """
     if len(held_out) < 2:
-        raise InputError(f"{len(held_out)} held-out views, at least 2 are needed", code="too_few_views")
+        raise InputError(f"{len(held_out)} held-out views, at least 2 are needed", code=Code.TOO_FEW_VIEWS)
     problem = estimate.corrected(held_out).with_camera(estimate.camera).problem
     squared = [
         problem.squared_error(estimate.X.matrix, estimate.Y.matrix, views=[k]) / count
@@ -107,7 +108,7 @@ def _as_estimated(estimate: Estimate, held_out: Measurements) -> Measurements:
 
 def _some(held_out: Measurements) -> Measurements:
     if len(held_out) == 0:
-        raise InputError("no held-out views", code="too_few_views")
+        raise InputError("no held-out views", code=Code.TOO_FEW_VIEWS)
     return held_out
 
 

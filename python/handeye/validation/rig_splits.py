@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DegenerateError, InputError, SolveError
 from handeye.estimation import RigCalibration, solve_rig
 from handeye.types import Pose, RigRecording
@@ -115,7 +116,7 @@ def validate_rig(
     if count < 2 * FEWEST_STATIONS:
         raise InputError(
             f"{count} stations, at least {2 * FEWEST_STATIONS} are needed to compare halves",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
             hint="take more stations",
         )
     random = np.random.default_rng(seed)

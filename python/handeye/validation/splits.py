@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.compute.parallel import Progress, part_of, run_all
 from handeye.errors import HandeyeError, InputError
 from handeye.estimation import Estimate, Measurements, make_estimator, require_determined
@@ -213,7 +214,7 @@ def validate(
     if count < FEWEST_VIEWS:
         raise InputError(
             f"{recording.name}: {count} usable views, at least {FEWEST_VIEWS} are needed for two halves",
-            code="too_few_views",
+            code=Code.TOO_FEW_VIEWS,
             hint="take more views",
         )
     random = np.random.default_rng(seed)

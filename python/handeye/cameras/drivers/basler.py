@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from handeye.cameras.protocol import Frame
+from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.extension import library
 
@@ -70,7 +71,7 @@ class BaslerCamera:
                 try:
                     if not result.GrabSucceeded():
                         raise DeviceError(
-                            f"{label}: broken picture: {result.GetErrorDescription()}", code="no_image"
+                            f"{label}: broken picture: {result.GetErrorDescription()}", code=Code.NO_IMAGE
                         )
                     pixels = np.array(self._grey.Convert(result).GetArray(), dtype=np.uint8)
                     stamp = int(result.GetTimeStamp())
@@ -80,7 +81,7 @@ class BaslerCamera:
                 self._close()
                 raise DeviceError(
                     f"{label}: camera {self._serial or '(the only one)'}: {str(error).strip()}",
-                    code="no_image",
+                    code=Code.NO_IMAGE,
                     hint="check cable and power; a trigger that is switched on waits for ever",
                 ) from error
         return Frame(pixels, timestamp_s=stamp / 1e9 if stamp else None)
@@ -99,7 +100,7 @@ class BaslerCamera:
         if (self._serial and self._serial not in serials) or (not self._serial and len(there) != 1):
             raise DeviceError(
                 f"camera {self._serial or '(the only one)'}: not found; there are: {listed}",
-                code="no_camera",
+                code=Code.NO_CAMERA,
                 hint="name one by its serial number, such as basler:40012345",
             )
         try:
@@ -112,7 +113,7 @@ class BaslerCamera:
         except self._errors as error:
             raise DeviceError(
                 f"camera {self._serial or '(the only one)'}: {str(error).strip()}",
-                code="no_camera",
+                code=Code.NO_CAMERA,
                 hint="is another program using it?",
             ) from error
         return camera

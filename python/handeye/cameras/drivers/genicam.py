@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from handeye.cameras.protocol import Frame, Grey
+from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.extension import library
 
@@ -90,7 +91,7 @@ class GenicamCamera:
                 self.close()
                 raise DeviceError(
                     f"{label}: camera {self._name or '(the only one)'}: {type(error).__name__}: {error}",
-                    code="no_image",
+                    code=Code.NO_IMAGE,
                     hint="check cable and power; a trigger that is switched on waits for ever",
                 ) from error
         return Frame(grey, timestamp_s=stamp / 1e9 if stamp else None)
@@ -109,7 +110,7 @@ class GenicamCamera:
             listed = ", ".join(f"{_identity(info)} {info.model}" for info in there) or "none"
             raise DeviceError(
                 f"camera {self._name or '(the only one)'}: not found; there are: {listed}",
-                code="no_camera",
+                code=Code.NO_CAMERA,
                 hint="name one by its serial number, such as genicam:40012345",
             )
         try:
@@ -117,7 +118,7 @@ class GenicamCamera:
         except Exception as error:
             raise DeviceError(
                 f"camera {self._name}: {type(error).__name__}: {error}",
-                code="no_camera",
+                code=Code.NO_CAMERA,
                 hint="is another program using it?",
             ) from error
 
@@ -135,12 +136,12 @@ def _harvester(producers: list[Path]) -> Any:  # noqa: ANN401 - a harvester
     if not producers:
         raise DeviceError(
             "no GenTL producer is known",
-            code="no_camera",
+            code=Code.NO_CAMERA,
             hint=f"install the maker's software, which sets {PRODUCERS}, or name it: genicam:,maker.cti",
         )
     missing = [file for file in producers if not file.is_file()]
     if missing:
-        raise DeviceError(f"{missing[0]}: no such producer", code="no_camera")
+        raise DeviceError(f"{missing[0]}: no such producer", code=Code.NO_CAMERA)
     key = tuple(file.resolve() for file in producers)
     if key not in _HARVESTERS:
         _HARVESTERS[key] = module.Harvester()
@@ -178,6 +179,6 @@ def _grey(label: str, component: Any) -> Grey:  # noqa: ANN401 - of a buffer
         return np.array(cv2.cvtColor(component.data.reshape(shape), COLOURS[form]), dtype=np.uint8)
     raise DeviceError(
         f"{label}: pixels in {form}, expected one of {', '.join([*BITS, *COLOURS])}",
-        code="bad_image",
+        code=Code.BAD_IMAGE,
         hint="choose Mono8 in the maker's viewer",
     )

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from handeye.cameras.protocol import Frame, Grey
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.extension import library
 
@@ -42,7 +43,9 @@ class RealSenseCamera:
         stream, _, size = rest.partition(",")
         width, _, height = size.partition("x")
         if stream not in {"", *STREAMS} or (size and not (width.isdecimal() and height.isdecimal())):
-            raise InputError(f"address {address[:60]!r}, expected SERIAL,color,1280x720", code="bad_address")
+            raise InputError(
+                f"address {address[:60]!r}, expected SERIAL,color,1280x720", code=Code.BAD_ADDRESS
+            )
         self._serial, self._stream = serial, stream or STREAMS[0]
         self._size = (int(width), int(height)) if size else None
         self._rs = library("pyrealsense2", "realsense")
@@ -104,7 +107,7 @@ class RealSenseCamera:
                 self._forget()
                 raise DeviceError(
                     f"{label}: camera {self._serial or '(the only one)'}: {str(error).strip()}",
-                    code="no_image",
+                    code=Code.NO_IMAGE,
                     hint="check the cable (USB 3) and that no other program has the camera",
                 ) from error
 
@@ -139,7 +142,7 @@ class RealSenseCamera:
             listed = ", ".join(serials) or "none"
             raise DeviceError(
                 f"camera {self._serial or '(the only one)'}: not found; there are: {listed}",
-                code="no_camera",
+                code=Code.NO_CAMERA,
                 hint="name one by its serial number, such as realsense:832112070000",
             )
         try:
@@ -151,7 +154,7 @@ class RealSenseCamera:
             self._sensor = None
             raise DeviceError(
                 f"camera {self._serial}: {str(error).strip()}",
-                code="no_camera",
+                code=Code.NO_CAMERA,
                 hint="is another program using it?",
             ) from error
 
@@ -171,7 +174,7 @@ class RealSenseCamera:
             listed = ", ".join(f"{w}x{h}" for w, h in sorted(sizes)) or "none"
             raise DeviceError(
                 f"camera {self._serial}: no {self._stream} of the size asked for; there are: {listed}",
-                code="no_camera",
+                code=Code.NO_CAMERA,
             )
         return next((sensor, profile) for size, sensor, profile in known if size == wanted)
 

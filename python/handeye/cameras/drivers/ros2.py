@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from handeye.cameras.protocol import Frame, Grey
+from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.ros.link import RosLink, look_around, options_of, ros_library, seconds
 from handeye.ros.stamps import BAD_STAMP, Stream
@@ -52,8 +53,8 @@ class Ros2Camera:
         info = options["info"] or f"{topic.rpartition('/')[0]}/camera_info"
         messages = ros_library("sensor_msgs.msg")
         self._link = RosLink("handeye_camera", options["clock"])
-        self._pictures: Stream[Any] = Stream(topic, self._link.now_s, keep=4, code="no_image")
-        self._infos: Stream[Any] = Stream(info, self._link.now_s, keep=40, code="no_camera_info")
+        self._pictures: Stream[Any] = Stream(topic, self._link.now_s, keep=4, code=Code.NO_IMAGE)
+        self._infos: Stream[Any] = Stream(info, self._link.now_s, keep=40, code=Code.NO_CAMERA_INFO)
         self._known: tuple[Any, ...] | None = None
         try:
             self._listen(messages, topic, info)
@@ -74,7 +75,7 @@ class Ros2Camera:
                 listed = ", ".join(self._link.topics(kind)[:20]) or "none"
                 raise DeviceError(
                     f"{name}: nothing comes; topics of {kind} are: {listed}",
-                    code="no_camera",
+                    code=Code.NO_CAMERA,
                     hint="name the topic of the pictures: ros2:/wrist/image_raw,info=/wrist/camera_info",
                 ) from error
 
@@ -104,14 +105,14 @@ class Ros2Camera:
             raise DeviceError(
                 f"{label}: camera_info is of {info.width} x {info.height} pixels, the picture of "
                 f"{found.value.width} x {found.value.height}",
-                code="camera_changed",
+                code=Code.CAMERA_CHANGED,
                 hint="calibrate the camera at the size that is published",
             )
         known = (info.distortion_model, *np.asarray(info.k).tolist(), *np.asarray(info.d).tolist())
         if self._known is not None and known != self._known:
             raise DeviceError(
                 f"{label}: camera_info is another than that of the first picture",
-                code="camera_changed",
+                code=Code.CAMERA_CHANGED,
                 hint="switch autofocus off, and begin a new session",
             )
         self._known = known
@@ -135,14 +136,14 @@ def grey_of(label: str, message: Any) -> Grey:  # noqa: ANN401 - sensor_msgs/Ima
     if not depth:
         raise DeviceError(
             f"{label}: encoding {form[:40]!r}, expected one of {', '.join([*PLAIN, *COLOURS])}",
-            code="bad_image",
+            code=Code.BAD_IMAGE,
         )
     data = np.frombuffer(message.data, np.uint8)
     sizes = 0 < width <= LARGEST_PX and 0 < height <= LARGEST_PX
     if not sizes or step < width * depth or len(data) < step * height:
         raise DeviceError(
             f"{label}: {len(data)} bytes for {width} x {height} pixels of {form}, {step} bytes a row",
-            code="bad_image",
+            code=Code.BAD_IMAGE,
         )
     rows = data[: step * height].reshape(height, step)[:, : width * depth]
     if form in COLOURS:

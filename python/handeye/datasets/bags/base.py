@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from handeye.codes import Code
 from handeye.datasets.reading import MIB
 from handeye.errors import InputError
 
@@ -89,7 +90,7 @@ class Budget:
         if self._bytes > MAX_TOTAL_BYTES or self._messages > MAX_MESSAGES:
             raise InputError(
                 f"{self._path}: more than {MAX_TOTAL_BYTES >> 30} GiB or {MAX_MESSAGES} messages",
-                code="too_large",
+                code=Code.TOO_LARGE,
                 hint="cut out the calibration first",
             )
 
@@ -109,6 +110,6 @@ def checked_size(size: int, path: Path, what: str = "record") -> int:
     """
     if not 0 <= size <= MAX_RECORD_BYTES:
         raise InputError(
-            f"{path}: a {what} of {size} bytes, expected at most {MAX_RECORD_BYTES}", code="too_large"
+            f"{path}: a {what} of {size} bytes, expected at most {MAX_RECORD_BYTES}", code=Code.TOO_LARGE
         )
     return size

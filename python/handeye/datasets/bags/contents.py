@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.datasets.bags import messages
 from handeye.datasets.bags.base import Record, Topic
 from handeye.datasets.bags.folder import reader_of
@@ -147,7 +148,7 @@ def read_contents(path: Path) -> Contents:
             with located(str(path)):
                 contents.take(record)
     except OSError as error:
-        raise InputError(f"{path}: {error}", code="unreadable") from error
+        raise InputError(f"{path}: {error}", code=Code.UNREADABLE) from error
     contents.topics, contents.is_cut = reader.topics, reader.is_cut
     return contents
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import cast
 
+from handeye.codes import Code
 from handeye.datasets.bags.base import MAX_RECORD_BYTES, BagReader, Record, Topic
 from handeye.datasets.bags.mcap import MAGIC as MCAP_MAGIC
 from handeye.datasets.bags.mcap import Mcap
@@ -92,7 +93,7 @@ def _of_file(path: Path) -> BagReader:
     if kind is None:
         raise InputError(
             f"{path}: does not begin like a bag of ROS 1, MCAP or a database of rosbag2",
-            code="unknown_format",
+            code=Code.UNKNOWN_FORMAT,
             hint="a bag that is compressed as a whole has to be unpacked first",
         )
     return kind(path)
@@ -114,12 +115,12 @@ def _listed(path: Path) -> tuple[list[str], bool]:
     table: Mapping[str, object] = cast("Mapping[str, object]", told) if isinstance(told, Mapping) else {}
     files = table.get("relative_file_paths")
     if not isinstance(files, list) or not files:
-        raise InputError(f"{where}: relative_file_paths lists no file", code="invalid_field")
+        raise InputError(f"{where}: relative_file_paths lists no file", code=Code.INVALID_FIELD)
     mode = str(table.get("compression_mode", "")).lower()
     if mode == "file":
         raise InputError(
             f"{path}: a bag that is compressed file by file",
-            code="unknown_format",
+            code=Code.UNKNOWN_FORMAT,
             hint="unpack it first: ros2 bag convert, or zstd -d and a metadata.yaml without compression",
         )
     return [

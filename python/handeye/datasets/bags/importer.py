@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from handeye.codes import Code
 from handeye.datasets.bags.contents import Contents, read_contents
 from handeye.datasets.bags.folder import SUFFIXES, is_bag
 from handeye.datasets.image_set import ImportOptions
@@ -25,7 +26,7 @@ def read(path: Path, options: ImportOptions) -> Contents:  # noqa: ARG001 - what
     """
     bag = _bag(path)
     if bag is None:
-        raise InputError(f"{path}: no bag of ROS 1, rosbag2 or MCAP", code="unknown_format")
+        raise InputError(f"{path}: no bag of ROS 1, rosbag2 or MCAP", code=Code.UNKNOWN_FORMAT)
     return read_contents(bag)
 
 

@@ -12,6 +12,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
+from handeye.codes import Code
 from handeye.datasets.bags.base import MAX_NAME, MAX_TOPICS, Budget, Record, Topic, checked_size, plain_kind
 from handeye.datasets.bags.unpacking import unpacked
 from handeye.errors import InputError
@@ -36,7 +37,7 @@ class Mcap:
         """Return the messages of these types; raises `InputError`."""
         with self._path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
-                raise InputError(f"{self._path}: no MCAP file", code="unknown_format")
+                raise InputError(f"{self._path}: no MCAP file", code=Code.UNKNOWN_FORMAT)
             yield from self._walk(file, kinds, Budget(self._path), in_chunk=False)
 
     def _walk(
@@ -71,7 +72,7 @@ class Mcap:
                     if topic is not None and topic.kind in kinds:
                         yield Record(topic, received_ns, content[22:])
             except (struct.error, UnicodeDecodeError) as error:
-                raise InputError(f"{self._path}: a record that is cut off", code="damaged_bag") from error
+                raise InputError(f"{self._path}: a record that is cut off", code=Code.DAMAGED_BAG) from error
 
     def _content(self, file: BinaryIO, opcode: int, size: int) -> bytes | None:
         """Return the content of a record, nothing of one that is of no use; None if the file ends before."""
@@ -95,7 +96,7 @@ class Mcap:
         name, at = _text(content, 4)
         encoding, _ = _text(content, at)
         if len(self._channels) >= MAX_TOPICS:
-            raise InputError(f"{self._path}: more than {MAX_TOPICS} channels", code="too_large")
+            raise InputError(f"{self._path}: more than {MAX_TOPICS} channels", code=Code.TOO_LARGE)
         is_cdr = _ENCODINGS.get(encoding)
         topic = None if is_cdr is None else Topic(name, self._schemas.get(schema, ""), is_cdr)
         self._channels[key] = topic

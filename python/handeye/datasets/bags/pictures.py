@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handeye.codes import Code
 from handeye.datasets.bags.messages import Compressed, Raw
 from handeye.datasets.images import MAX_PIXELS, decoded, eight_bits
 from handeye.errors import InputError
@@ -35,7 +36,8 @@ def grey_of(picture: Raw | Compressed, where: str) -> Grey:
         suffix = next((s for head, s in _FILES.items() if content.startswith(head)), None)
         if suffix is None:
             raise InputError(
-                f"{where}: a compressed picture ({picture.format[:40]}) of no known kind", code="not_an_image"
+                f"{where}: a compressed picture ({picture.format[:40]}) of no known kind",
+                code=Code.NOT_AN_IMAGE,
             )
         return decoded(content, suffix, where)
     return _plain(picture, where)
@@ -48,7 +50,7 @@ def _plain(picture: Raw, where: str) -> Grey:
         known = ", ".join(sorted(_GREY | _DEEP | set(_COLOURS)))
         raise InputError(
             f"{where}: pictures in {picture.encoding[:40]!r}, expected {known}",
-            code="not_an_image",
+            code=Code.NOT_AN_IMAGE,
             hint="name the topic of the camera with --image-topic",
         )
     deep = encoding in _DEEP
@@ -60,7 +62,7 @@ def _plain(picture: Raw, where: str) -> Grey:
     ):
         raise InputError(
             f"{where}: {picture.width} x {picture.height} pixels of {encoding} in {len(picture.data)} bytes",
-            code="damaged_image",
+            code=Code.DAMAGED_IMAGE,
         )
     flat = np.frombuffer(picture.data, np.uint8, picture.step_bytes * picture.height)
     rows = flat.reshape(picture.height, picture.step_bytes)[:, :row]

@@ -12,6 +12,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
+from handeye.codes import Code
 from handeye.datasets.bags.base import MAX_RECORD_BYTES, MAX_TOPICS, Budget, Record, Topic, checked_size
 from handeye.datasets.bags.unpacking import unpacked
 from handeye.errors import InputError
@@ -39,7 +40,7 @@ class Rosbag1:
         budget = Budget(self._path)
         with self._path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
-                raise InputError(f"{self._path}: no bag of ROS 1, format 2.0", code="unknown_format")
+                raise InputError(f"{self._path}: no bag of ROS 1, format 2.0", code=Code.UNKNOWN_FORMAT)
             yield from self._walk(file, connections, kinds, budget, in_chunk=False)
 
     def _walk(
@@ -75,7 +76,7 @@ class Rosbag1:
                     seconds, nanoseconds = struct.unpack("<II", self._field(fields, "time", 8))
                     yield Record(topic, seconds * 10**9 + nanoseconds, data)
             elif code == _HEADER and fields.get("encryptor"):
-                raise InputError(f"{self._path}: an encrypted bag", code="unknown_format")
+                raise InputError(f"{self._path}: an encrypted bag", code=Code.UNKNOWN_FORMAT)
 
     def _record(self, file: BinaryIO) -> tuple[dict[str, bytes], bytes] | None:
         """Return header and data of the next record; None at the end."""
@@ -92,7 +93,7 @@ class Rosbag1:
         (size,) = struct.unpack("<I", length)
         if size > most:
             raise InputError(
-                f"{self._path}: a {what} of {size} bytes, expected at most {most}", code="damaged_bag"
+                f"{self._path}: a {what} of {size} bytes, expected at most {most}", code=Code.DAMAGED_BAG
             )
         content = file.read(size)
         if len(content) < size:
@@ -106,7 +107,7 @@ class Rosbag1:
             (size,) = struct.unpack_from("<I", header, at)
             name, equals, value = header[at + 4 : at + 4 + size].partition(b"=")
             if not equals or at + 4 + size > len(header):
-                raise InputError(f"{self._path}: a header that is no list of fields", code="damaged_bag")
+                raise InputError(f"{self._path}: a header that is no list of fields", code=Code.DAMAGED_BAG)
             fields[name.decode("ascii", "replace")] = value
             at += 4 + size
         return fields
@@ -125,14 +126,14 @@ class Rosbag1:
             is_cdr=False,
         )
         if len(connections) >= MAX_TOPICS:
-            raise InputError(f"{self._path}: more than {MAX_TOPICS} connections", code="too_large")
+            raise InputError(f"{self._path}: more than {MAX_TOPICS} connections", code=Code.TOO_LARGE)
         connections[self._number(fields, "conn", "<I")] = topic
         self.topics[topic.name] = topic
 
     def _field(self, fields: dict[str, bytes], name: str, size: int) -> bytes:
         value = fields.get(name, b"")
         if len(value) != size:
-            raise InputError(f"{self._path}: a record without its field {name}", code="damaged_bag")
+            raise InputError(f"{self._path}: a record without its field {name}", code=Code.DAMAGED_BAG)
         return value
 
     def _number(self, fields: dict[str, bytes], name: str, form: str) -> int:

@@ -7,6 +7,7 @@ from contextlib import closing
 from pathlib import Path
 from urllib.parse import quote
 
+from handeye.codes import Code
 from handeye.datasets.bags.base import MAX_RECORD_BYTES, MAX_TOPICS, Budget, Record, Topic, plain_kind
 from handeye.errors import InputError
 
@@ -39,13 +40,13 @@ class Sqlite3:
                 )
                 for key, received_ns, data in found:
                     if not (isinstance(received_ns, int) and isinstance(data, bytes)):
-                        raise InputError(f"{self._path}: a message that is none", code="damaged_bag")
+                        raise InputError(f"{self._path}: a message that is none", code=Code.DAMAGED_BAG)
                     budget.spend(len(data), messages=1)
                     yield Record(wanted[key], received_ns, data)
         except sqlite3.Error as error:
             raise InputError(
                 f"{self._path}: no database that can be read: {str(error)[:100]}",
-                code="damaged_bag",
+                code=Code.DAMAGED_BAG,
                 hint="copy the whole bag; `ros2 bag reindex` repairs one that was not closed",
             ) from error
 
@@ -73,7 +74,9 @@ class Sqlite3:
             database.execute("SELECT name, type FROM sqlite_master WHERE name IN ('topics', 'messages')")
         )
         if plain != {"topics": "table", "messages": "table"}:
-            raise InputError(f"{self._path}: no tables topics and messages of rosbag2", code="unknown_format")
+            raise InputError(
+                f"{self._path}: no tables topics and messages of rosbag2", code=Code.UNKNOWN_FORMAT
+            )
         found: dict[int, Topic] = {}
         for key, name, kind, form in database.execute(
             "SELECT id, name, type, serialization_format FROM topics LIMIT ?", (MAX_TOPICS,)

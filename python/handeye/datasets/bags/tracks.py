@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.datasets.bags.contents import Poses, Stamps, matrices
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray
@@ -101,7 +102,7 @@ def rising(times_s: FloatArray, poses: FloatArray, words: str, joints: FloatArra
     order = np.flatnonzero(usable)[np.argsort(times_s[usable], kind="stable")]
     order = order[np.concatenate([[True], np.diff(times_s[order]) > 0])] if len(order) else order
     if len(order) < 2:
-        raise InputError(f"{words}: fewer than two poses at different times", code="no_poses")
+        raise InputError(f"{words}: fewer than two poses at different times", code=Code.NO_POSES)
     return Track(times_s[order], poses[order], words, None if joints is None else joints[order])
 
 
@@ -131,7 +132,7 @@ def chain(
     tracks = [part for part, _ in parts if isinstance(part, Track)]
     words = f"tf, {flange} in {base}"
     if not tracks:
-        raise InputError(f"{words}: nothing between them moves", code="no_poses")
+        raise InputError(f"{words}: nothing between them moves", code=Code.NO_POSES)
     start, end = max(t.times_s[0] for t in tracks), min(t.times_s[-1] for t in tracks)
     finest = max(tracks, key=lambda track: len(track.times_s)).times_s
     times = finest[(finest >= start) & (finest <= end)]
@@ -188,7 +189,7 @@ def way(
         known = ", ".join(sorted({name for edge in (*moving, *static) for name in edge})[:30])
         raise InputError(
             f"tf does not connect {base} with {flange}",
-            code="unknown_frame",
+            code=Code.UNKNOWN_FRAME,
             hint=f"the frames are {known}; name two with --base-frame and --flange-frame",
         )
     first, second = (frames[: frames.index(met) + 1] for frames in ways)

@@ -7,6 +7,7 @@ import bz2
 from importlib import import_module
 from typing import Any, Protocol, cast
 
+from handeye.codes import Code
 from handeye.errors import InputError
 
 # No messages get smaller than by this factor; a few lines of bytes may claim to.
@@ -44,11 +45,11 @@ def unpacked(data: bytes, method: str, limit: int, where: str) -> bytes:
         # One byte more than allowed tells that there is more.
         content = unpacker.decompress(data, max_length=most + 1)
     except failures as error:
-        raise InputError(f"{where}: damaged: {str(error)[:100]}", code="damaged_bag") from error
+        raise InputError(f"{where}: damaged: {str(error)[:100]}", code=Code.DAMAGED_BAG) from error
     if len(content) > most:
         raise InputError(
             f"{where}: {len(data)} bytes that unpack to more than {most}",
-            code="too_large",
+            code=Code.TOO_LARGE,
             hint="wrong file?",
         )
     return content
@@ -64,7 +65,7 @@ def _unpacker(method: str, where: str) -> tuple[_Unpacker, tuple[type[Exception]
         zstd = _library(("compression.zstd", "backports.zstd"), method, where)
         return cast("_Unpacker", zstd.ZstdDecompressor()), (zstd.ZstdError, EOFError, ValueError)
     raise InputError(
-        f"{where}: compressed with {method[:40]!r}, expected bz2, lz4 or zstd", code="unknown_format"
+        f"{where}: compressed with {method[:40]!r}, expected bz2, lz4 or zstd", code=Code.UNKNOWN_FORMAT
     )
 
 
@@ -76,6 +77,6 @@ def _library(names: tuple[str, ...], method: str, where: str) -> Any:  # noqa: A
             continue
     raise InputError(
         f"{where}: compressed with {method}",
-        code="missing_library",
+        code=Code.MISSING_LIBRARY,
         hint="pip install 'handeye[bags]' brings what unpacks it",
     )

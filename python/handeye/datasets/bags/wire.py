@@ -6,6 +6,7 @@ ROS 1 (http://wiki.ros.org/msg): little endian, nothing between the values. CDR 
 
 import struct
 
+from handeye.codes import Code
 from handeye.errors import InputError
 
 _MAX_TEXT = 4096
@@ -95,4 +96,4 @@ class Wire:
         return taken
 
     def _damaged(self, found: str) -> InputError:
-        return InputError(f"{self._where}: {found}", code="damaged_bag")
+        return InputError(f"{self._where}: {found}", code=Code.DAMAGED_BAG)

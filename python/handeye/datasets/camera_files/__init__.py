@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import cast
 
+from handeye.codes import Code
 from handeye.datasets.camera_files import (
     camera_info,
     depth_cameras,
@@ -60,7 +61,7 @@ def read_camera(path: str | os.PathLike[str]) -> Camera:
         if found is None:
             raise InputError(
                 f"no camera in it: expected {', '.join(member.name for member in FORMATS)}, or ost.txt",
-                code="unknown_format",
+                code=Code.UNKNOWN_FORMAT,
                 hint="docs/commands/solve.md shows how a camera is written",
             )
         return found.read(document)
@@ -100,8 +101,8 @@ def _document(file: Path) -> Table:
     else:
         raise InputError(
             f"{file}: a camera in a file of this kind, expected .toml, .json, .yaml, .yml, .xml or ost.txt",
-            code="unknown_format",
+            code=Code.UNKNOWN_FORMAT,
         )
     if not isinstance(document, Mapping):
-        raise InputError(f"{file}: expected a table with the fields of a camera", code="invalid_field")
+        raise InputError(f"{file}: expected a table with the fields of a camera", code=Code.INVALID_FIELD)
     return {str(key): value for key, value in cast("Mapping[object, object]", document).items()}

@@ -7,6 +7,7 @@ from typing import cast
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types import Camera
 from handeye.types.arrays import FloatArray
@@ -57,7 +58,7 @@ def camera_of(
     if not matrix.any():
         raise InputError(
             "a camera matrix of zeros: this camera was never calibrated",
-            code="not_calibrated",
+            code=Code.NOT_CALIBRATED,
             hint="calibrate it, or leave the camera out: it is calibrated from the pictures then",
         )
     coefficients = np.array(distortion, dtype=np.float64)
@@ -68,12 +69,12 @@ def camera_of(
     if name in _INVERSE:
         raise InputError(
             f"distortion model {name}: its coefficients lead from pixels to rays, expected those of OpenCV",
-            code="unknown_lens",
+            code=Code.UNKNOWN_LENS,
             hint="calibrate it with OpenCV, or leave it out: it is calibrated from the pictures then",
         )
     if name not in _FISHEYE | _BROWN:
         known = ", ".join(sorted(_BROWN - _INVERSE | _FISHEYE))
-        raise InputError(f"distortion model {model[:40]!r}, expected one of {known}", code="unknown_lens")
+        raise InputError(f"distortion model {model[:40]!r}, expected one of {known}", code=Code.UNKNOWN_LENS)
     return Camera.from_opencv(matrix, coefficients, size, fisheye=name in _FISHEYE)
 
 
@@ -92,7 +93,7 @@ def table_at(document: Table, key: str) -> Table:
     """
     inner = document.get(key)
     if not isinstance(inner, Mapping):
-        raise InputError(f"{key}: expected a table", code="invalid_field")
+        raise InputError(f"{key}: expected a table", code=Code.INVALID_FIELD)
     return cast("Table", inner)
 
 
@@ -130,7 +131,7 @@ def size_at(document: Table, width: str, height: str) -> tuple[int, int]:
     if any(value != int(value) or value < 1 for value in size):
         raise InputError(
             f"{width} and {height}: {size[0]:g} x {size[1]:g}, expected pixels of the image",
-            code="out_of_range",
+            code=Code.OUT_OF_RANGE,
         )
     return int(size[0]), int(size[1])
 
@@ -144,7 +145,7 @@ def square(values: Sequence[float], what: str) -> FloatArray:
         Another number of them.
     """
     if len(values) != 9:
-        raise InputError(f"{what}: {len(values)} numbers, expected 9", code="wrong_shape")
+        raise InputError(f"{what}: {len(values)} numbers, expected 9", code=Code.WRONG_SHAPE)
     return np.array(values, dtype=np.float64).reshape(3, 3)
 
 
@@ -154,12 +155,12 @@ def _numbers(item: object, key: str) -> list[float]:
     if isinstance(item, str):
         item = item.replace(",", " ").strip("[] \n").split()
     if not isinstance(item, list):
-        raise InputError(f"{key}: expected a list of numbers", code="invalid_field")
+        raise InputError(f"{key}: expected a list of numbers", code=Code.INVALID_FIELD)
     values: list[float] = []
     for part in cast("list[object]", item):
         values += _numbers(cast("object", part), key) if isinstance(part, list) else [_number(part, key)]
         if len(values) > MAX_NUMBERS:
-            raise InputError(f"{key}: more than {MAX_NUMBERS} numbers", code="too_large")
+            raise InputError(f"{key}: more than {MAX_NUMBERS} numbers", code=Code.TOO_LARGE)
     return values
 
 
@@ -170,5 +171,5 @@ def _number(item: object, key: str) -> float:
             value = float(item) if "_" not in str(item)[:60] and len(str(item)) < 60 else value
     if not np.isfinite(value):
         found = "nothing" if item is None else repr(item)[:40]
-        raise InputError(f"{key}: {found}, expected a finite number", code="not_numbers")
+        raise InputError(f"{key}: {found}, expected a finite number", code=Code.NOT_NUMBERS)
     return value

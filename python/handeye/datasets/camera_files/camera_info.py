@@ -5,6 +5,7 @@ distortion_coefficients {rows, cols, data}; numbers as NumPy prints them, such a
 (sensor_msgs/CameraInfo): width, height, distortion_model, and D, K in ROS 1, d, k in ROS 2.
 """
 
+from handeye.codes import Code
 from handeye.datasets.camera_files.base import (
     CameraFormat,
     Table,
@@ -42,7 +43,7 @@ def _read_message(document: Table) -> Camera:
         if document.get(key) is not None and number_at(document, key) > 1:
             raise InputError(
                 f"{key}: {number_at(document, key):g}: the matrix belongs to the picture before binning",
-                code="image_size",
+                code=Code.IMAGE_SIZE,
                 hint="calibrate the camera at the size of the pictures",
             )
     matrix = square(numbers_at(document, k), k)

@@ -4,6 +4,7 @@ Kalibr wiki, "YAML formats": pinhole has fu, fv, pu, pv; radtan has k1, k2, r1, 
 p1, p2; equi is OpenCV's fisheye.
 """
 
+from handeye.codes import Code
 from handeye.datasets.camera_files.base import (
     CameraFormat,
     Table,
@@ -28,7 +29,7 @@ def _read(document: Table) -> Camera:
     if len(names) > 1:
         raise InputError(
             f"{len(names)} cameras ({', '.join(names)[:100]}), expected one",
-            code="several_cameras",
+            code=Code.SEVERAL_CAMERAS,
             hint="keep the camera that took the pictures, under the name cam0",
         )
     return _camera(document, "cam0")
@@ -56,15 +57,15 @@ def _camera(document: Table, name: str) -> Camera:
         raise InputError(
             f"{name}: {str(kind)[:40]}-{str(lens)[:40]}, expected pinhole-radtan, pinhole-equi or "
             "pinhole-none",
-            code="unknown_lens",
+            code=Code.UNKNOWN_LENS,
         )
     intrinsics = numbers_at(camera, "intrinsics")
     if len(intrinsics) != 4:
-        raise InputError(f"intrinsics: {len(intrinsics)} numbers, expected 4", code="wrong_shape")
+        raise InputError(f"intrinsics: {len(intrinsics)} numbers, expected 4", code=Code.WRONG_SHAPE)
     fx, fy, cx, cy = intrinsics
     size = numbers_at(camera, "resolution")
     if len(size) != 2:
-        raise InputError(f"resolution: {len(size)} numbers, expected 2", code="wrong_shape")
+        raise InputError(f"resolution: {len(size)} numbers, expected 2", code=Code.WRONG_SHAPE)
     pair = size_at({"width": size[0], "height": size[1]}, "width", "height")
     coefficients = [] if lens == "none" else numbers_at(camera, "distortion_coeffs")
     return camera_of(pinhole_matrix(fx, fy, cx, cy), coefficients, pair, _MODELS[lens])

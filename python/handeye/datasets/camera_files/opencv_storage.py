@@ -4,6 +4,7 @@ The names are those of OpenCV's own calibration samples (`calibration.cpp`, `cam
 `stereo_calib.cpp`) and of our export.
 """
 
+from handeye.codes import Code
 from handeye.datasets.camera_files.base import (
     CameraFormat,
     Table,
@@ -68,7 +69,7 @@ def _size(document: Table) -> tuple[int, int]:
                 return size_at({"width": values[0], "height": values[1]}, "width", "height")
     raise InputError(
         "the size of the image is not in the file",
-        code="invalid_field",
+        code=Code.INVALID_FIELD,
         hint="add image_width and image_height, or write the camera as TOML",
     )
 

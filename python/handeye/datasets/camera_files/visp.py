@@ -6,6 +6,7 @@ ViSP, `vpXmlParserCamera`; with distortion ``u = u0 + px x (1 + kud r^2)``, whic
 from collections.abc import Mapping
 from typing import cast
 
+from handeye.codes import Code
 from handeye.datasets.camera_files.base import (
     CameraFormat,
     Table,
@@ -35,7 +36,7 @@ def _read(document: Table) -> Camera:
     model = cast("Table", found[-1] if found and isinstance(found[-1], Mapping) else {})
     kind = str(model.get("type"))
     if not kind.startswith("perspectiveProjWith"):
-        raise InputError(f"model type {kind[:60]!r}, expected perspectiveProjWith...", code="unknown_lens")
+        raise InputError(f"model type {kind[:60]!r}, expected perspectiveProjWith...", code=Code.UNKNOWN_LENS)
     matrix = pinhole_matrix(*(number_at(model, key) for key in ("px", "py", "u0", "v0")))
     k1 = number_at(model, "kud") if "WithDistortion" in kind else 0.0
     return camera_of(matrix, [k1, 0.0, 0.0, 0.0], size_at(camera, "image_width", "image_height"))

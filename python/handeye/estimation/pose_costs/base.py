@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
 from handeye.errors import DegenerateError, InputError
 from handeye.types.arrays import FloatArray
 
@@ -81,7 +82,7 @@ def optimise(
     >>> X, Y = optimise(TABB_AHMAD_YOUSEF_1, PoseViews(A, C, points), start)
     """
     if len(views.A) < 3:
-        raise InputError(f"{len(views.A)} views, at least 3 are needed", code="too_few_views")
+        raise InputError(f"{len(views.A)} views, at least 3 are needed", code=Code.TOO_FEW_VIEWS)
     x, y = start
     damping = FIRST_DAMPING
     for _ in range(MOST_STEPS):
@@ -92,7 +93,7 @@ def optimise(
         normal, gradient = J.T @ J, J.T @ r
         scale = np.sqrt(np.diag(normal))
         if not np.all(scale > 0) or np.linalg.cond(normal / np.outer(scale, scale)) > MOST_CONDITION:
-            raise DegenerateError(f"{cost.name}: these views do not determine X and Y", code="degenerate")
+            raise DegenerateError(f"{cost.name}: these views do not determine X and Y", code=Code.DEGENERATE)
         before = float(r @ r)
         while True:
             damped = normal + damping * np.diag(scale**2)

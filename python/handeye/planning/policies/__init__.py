@@ -1,5 +1,6 @@
 """Which candidate to take next: one file per policy."""
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.extension import POLICIES as GROUP
 from handeye.extension import announced
@@ -45,11 +46,13 @@ def make_policy(name: str) -> Policy:
     others = announced(GROUP)
     if name not in others:
         known = ", ".join([*POLICIES, *others])
-        raise InputError(f"policy {name!r}, expected one of {known}", code="unknown_policy")
+        raise InputError(f"policy {name!r}, expected one of {known}", code=Code.UNKNOWN_POLICY)
     try:
         found = others[name].load()()
     except Exception as error:
-        raise InputError(f"policy {name}: {type(error).__name__}: {error}", code="unknown_policy") from error
+        raise InputError(
+            f"policy {name}: {type(error).__name__}: {error}", code=Code.UNKNOWN_POLICY
+        ) from error
     if not isinstance(found, Policy):
-        raise InputError(f"policy {name}: {type(found).__name__} is no Policy", code="unknown_policy")
+        raise InputError(f"policy {name}: {type(found).__name__} is no Policy", code=Code.UNKNOWN_POLICY)
     return found

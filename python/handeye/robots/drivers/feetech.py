@@ -6,6 +6,7 @@ Feetech, SMS/STS protocol manual and memory table of the STS3215: little-endian,
 import threading
 from typing import Any
 
+from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.extension import library
 
@@ -99,7 +100,7 @@ class FeetechBus:
             if answer[1]:
                 raise DeviceError(
                     f"servo {servo} reports an error (bits {answer[1]:#04x}, such as voltage, heat, load)",
-                    code="not_ready",
+                    code=Code.NOT_READY,
                     hint="see to its cause, switch the arm off and on, then go on with --resume",
                 )
             return answer[2]
@@ -132,7 +133,7 @@ class FeetechBus:
     def _lost(self, why: str) -> DeviceError:
         return DeviceError(
             f"{self._port}: {why}",
-            code="connection_lost",
+            code=Code.CONNECTION_LOST,
             hint="check cable and power of the arm, and that no other program has the port",
         )
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.extension import library
 from handeye.robots.protocol import Goal, Reading
@@ -41,7 +42,7 @@ class FrankaRobot:
         self._host, _, option = address.partition(",")
         if not self._host or option not in {"", "no-realtime"}:
             raise InputError(
-                f"address {address[:60]!r}, expected HOST or HOST,no-realtime", code="bad_address"
+                f"address {address[:60]!r}, expected HOST or HOST,no-realtime", code=Code.BAD_ADDRESS
             )
         self._franky = library("franky", "franka")
         realtime = self._franky.RealtimeConfig
@@ -71,13 +72,13 @@ class FrankaRobot:
             `motion_refused` beyond the joint limits, or without joints; `stopped`; `connection_lost`.
         """
         if goal.joints_rad is None or len(goal.joints_rad) != JOINTS:
-            raise DeviceError(f"{goal.label}: seven joint positions are needed", code="motion_refused")
+            raise DeviceError(f"{goal.label}: seven joint positions are needed", code=Code.MOTION_REFUSED)
         self._check_limits(goal.label, goal.joints_rad)
         arm = self._connected()
         franky = self._franky
         try:
             if arm.has_errors and not arm.recover_from_errors():
-                raise DeviceError("the arm reports an error that cannot be undone", code="not_ready")
+                raise DeviceError("the arm reports an error that cannot be undone", code=Code.NOT_READY)
             limits = np.asarray(arm.joint_velocity_limit.max)
             arm.joint_velocity_limit.set([min(float(goal.speed_rad_s), float(limit)) for limit in limits])
             share = franky.RelativeDynamicsFactor(1.0, ACCELERATION_SHARE, JERK_SHARE)
@@ -92,7 +93,9 @@ class FrankaRobot:
         self._settled(arm)
         off = float(np.abs(np.asarray(arm.state.q) - goal.joints_rad).max())
         if off > 0.02:
-            raise DeviceError(f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it", code="stopped")
+            raise DeviceError(
+                f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it", code=Code.STOPPED
+            )
 
     def read_pose(self) -> Reading:
         """Return the pose of the flange, whatever end effector is set, and the joints.
@@ -136,7 +139,7 @@ class FrankaRobot:
             if not low <= value <= high:
                 raise DeviceError(
                     f"{label}: joint {number} at {value:.3f} rad, limits {low} to {high}",
-                    code="motion_refused",
+                    code=Code.MOTION_REFUSED,
                 )
 
     def _ended(self, arm: Any) -> None:  # noqa: ANN401 - a robot of franky
@@ -163,7 +166,7 @@ class FrankaRobot:
             elif now_s - since_s > REST_S:
                 return
             time.sleep(POLL_S)
-        raise DeviceError("the arm does not come to rest", code="not_at_rest")
+        raise DeviceError("the arm does not come to rest", code=Code.NOT_AT_REST)
 
     def _connected(self) -> Any:  # noqa: ANN401 - a robot of franky
         with self._lock:
@@ -180,7 +183,7 @@ class FrankaRobot:
             self._link = None  # connected again at the next call, which moves nothing by itself
         return DeviceError(
             f"{what}: {str(error).strip()}",
-            code="connection_lost" if lost else "stopped",
+            code=Code.CONNECTION_LOST if lost else Code.STOPPED,
             hint="is the control interface (FCI) active, are the brakes open, is the network direct?",
         )
 

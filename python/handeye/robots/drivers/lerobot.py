@@ -14,6 +14,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.robots.drivers.feetech import (
     ACCELERATION_TO_SPEED,
@@ -84,7 +85,7 @@ class LeRobotArm:
         port, *files = address.split(",")
         if not port or len(files) not in {2, 3}:
             raise InputError(
-                f"address {address[:80]!r}, expected PORT,CALIBRATION.json,ARM.urdf", code="bad_address"
+                f"address {address[:80]!r}, expected PORT,CALIBRATION.json,ARM.urdf", code=Code.BAD_ADDRESS
             )
         self._arm = open_arm(files[1], tip=files[2] if len(files) == 3 else None)
         self._servos = _calibrated(Path(files[0]), self._arm)
@@ -125,7 +126,9 @@ class LeRobotArm:
             joints = self._settled(there)
         off = float(np.abs(joints - there).max())
         if self._stopped.is_set() or off > NEAR_RAD:
-            raise DeviceError(f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it", code="stopped")
+            raise DeviceError(
+                f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it", code=Code.STOPPED
+            )
 
     def read_pose(self) -> Reading:
         """Return the joints as the servos measure them, and the flange of the description there.
@@ -154,7 +157,7 @@ class LeRobotArm:
     def _checked(self, goal: Goal) -> FloatArray:
         if goal.joints_rad is None or len(goal.joints_rad) != len(self._servos):
             raise DeviceError(
-                f"{goal.label}: {len(self._servos)} joint positions are needed", code="motion_refused"
+                f"{goal.label}: {len(self._servos)} joint positions are needed", code=Code.MOTION_REFUSED
             )
         there = np.array(goal.joints_rad, dtype=np.float64)
         steps = self._steps(there)
@@ -162,10 +165,10 @@ class LeRobotArm:
             if not servo.low <= step <= servo.high:
                 raise DeviceError(
                     f"{goal.label}: {name} at step {step}, calibrated from {servo.low} to {servo.high}",
-                    code="motion_refused",
+                    code=Code.MOTION_REFUSED,
                 )
         if not self._arm.within_limits(there):
-            raise DeviceError(f"{goal.label}: beyond the joint limits", code="motion_refused")
+            raise DeviceError(f"{goal.label}: beyond the joint limits", code=Code.MOTION_REFUSED)
         return there
 
     def _lead(self, here: FloatArray, there: FloatArray, speed_rad_s: float) -> None:
@@ -221,7 +224,7 @@ class LeRobotArm:
                 if time.monotonic() - since_s > patient_s:
                     return joints
             time.sleep(CYCLE_S)
-        raise DeviceError("the arm does not come to rest", code="not_at_rest")
+        raise DeviceError("the arm does not come to rest", code=Code.NOT_AT_REST)
 
 
 def trapezoid(way: float, speed: float, acceleration: float) -> tuple[Callable[[float], float], float]:
@@ -257,14 +260,14 @@ def _calibrated(file: Path, arm: Arm) -> list[_Servo]:
         text = file.read_bytes()
         entries = msgspec.json.decode(text[:MAX_BYTES], type=dict[str, _Entry])
     except (OSError, msgspec.MsgspecError, RecursionError) as error:
-        raise InputError(f"{file}: {str(error)[:200]}", code="bad_calibration") from error
+        raise InputError(f"{file}: {str(error)[:200]}", code=Code.BAD_CALIBRATION) from error
     servos: list[_Servo] = []
     for name in arm.joint_names:
         entry = entries.get(name)
         if entry is None:
             raise InputError(
                 f"{file}: no calibration of joint {name[:60]!r}",
-                code="bad_calibration",
+                code=Code.BAD_CALIBRATION,
                 hint="the joints of the description must have LeRobot's names, such as shoulder_pan",
             )
         ordered = 0 <= entry.range_min < entry.range_max < STEPS_PER_TURN
@@ -273,7 +276,7 @@ def _calibrated(file: Path, arm: Arm) -> list[_Servo]:
                 f"{file}: joint {name[:60]!r}: range {entry.range_min} to {entry.range_max}, servo "
                 f"{entry.id}, drive_mode {entry.drive_mode}; "
                 f"expected steps of one turn, 0 to {MOST_SERVOS}, and 0",
-                code="bad_calibration",
+                code=Code.BAD_CALIBRATION,
             )
         middle = (entry.range_min + entry.range_max) / 2
         servos.append(_Servo(entry.id, middle, entry.range_min, entry.range_max))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.extension import library
 from handeye.robots.protocol import Goal, Reading
@@ -43,7 +44,7 @@ class RoboDKRobot:
         if not self._host or (port and not port.isdecimal()) or mode not in {"", "real"}:
             raise InputError(
                 f"address {address[:60]!r}, expected HOST:PORT,ROBOT or HOST:PORT,ROBOT,real",
-                code="bad_address",
+                code=Code.BAD_ADDRESS,
             )
         self._port = int(port or PORT)
         self._real = bool(mode)
@@ -60,7 +61,7 @@ class RoboDKRobot:
             `motion_refused` where RoboDK will not, or without joints; `stopped`; `connection_lost`.
         """
         if goal.joints_rad is None:
-            raise DeviceError(f"{goal.label}: joint positions are needed", code="motion_refused")
+            raise DeviceError(f"{goal.label}: joint positions are needed", code=Code.MOTION_REFUSED)
         degrees = np.rad2deg(goal.joints_rad).tolist()
         self._stopped.clear()
         robot = self._robot()
@@ -71,13 +72,13 @@ class RoboDKRobot:
                 time.sleep(POLL_S)
             joints = _rested(robot)
         except self._robolink.TargetReachError as error:
-            raise DeviceError(f"{goal.label}: {error}", code="motion_refused") from error
+            raise DeviceError(f"{goal.label}: {error}", code=Code.MOTION_REFUSED) from error
         except self._robolink.StoppedError as error:
-            raise DeviceError(f"{goal.label}: {error}", code="stopped") from error
+            raise DeviceError(f"{goal.label}: {error}", code=Code.STOPPED) from error
         except Exception as error:
             raise self._lost(goal.label, error) from error
         if self._stopped.is_set() or np.abs(joints - goal.joints_rad).max() > 0.02:
-            raise DeviceError(f"{goal.label}: stopped short of it", code="stopped")
+            raise DeviceError(f"{goal.label}: stopped short of it", code=Code.STOPPED)
 
     def read_pose(self) -> Reading:
         """Return the pose of the flange in the base, without tool and reference frame, and the joints.
@@ -130,7 +131,7 @@ class RoboDKRobot:
                 if state != READY:
                     raise DeviceError(
                         f"RoboDK has no connection to its robot: {said}",
-                        code="not_ready",
+                        code=Code.NOT_READY,
                         hint="connect it in RoboDK first (Connect to robot)",
                     )
         except DeviceError:
@@ -140,7 +141,7 @@ class RoboDKRobot:
         if not there:
             raise DeviceError(
                 f"RoboDK has no robot {self._name!r} in its station",
-                code="no_robot",
+                code=Code.NO_ROBOT,
                 hint="open the station, and name the robot as its tree does",
             )
         return robot
@@ -148,7 +149,7 @@ class RoboDKRobot:
     def _lost(self, what: str, error: Exception) -> DeviceError:
         return DeviceError(
             f"{what}: RoboDK at {self._host}:{self._port}: {type(error).__name__}: {error}",
-            code="connection_lost",
+            code=Code.CONNECTION_LOST,
             hint="is RoboDK running, with its API allowed from here?",
         )
 
@@ -162,4 +163,4 @@ def _rested(robot: Any) -> Any:  # noqa: ANN401 - an item of RoboDK; joints in r
             return joints
         before = joints
         time.sleep(POLL_S)
-    raise DeviceError("the arm does not come to rest", code="not_at_rest")
+    raise DeviceError("the arm does not come to rest", code=Code.NOT_AT_REST)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, HandeyeError
 from handeye.robots.model import Arm
 from handeye.robots.protocol import Goal, Reading
@@ -70,8 +71,12 @@ class Ros2Robot:
         self._link = RosLink("handeye_robot", options["clock"])
         self._stopped = threading.Event()
         self._motion: Any = None
-        self._description: Stream[str] = Stream(options["description"], time.monotonic, code="no_description")
-        self._states: Stream[dict[str, float]] = Stream(options["joints"], self._link.now_s, code="no_joints")
+        self._description: Stream[str] = Stream(
+            options["description"], time.monotonic, code=Code.NO_DESCRIPTION
+        )
+        self._states: Stream[dict[str, float]] = Stream(
+            options["joints"], self._link.now_s, code=Code.NO_JOINTS
+        )
         self._frames = Transforms(self._link.now_s)
         link = self._link
         link.subscribe(
@@ -124,11 +129,11 @@ class Ros2Robot:
         """
         joints = goal.joints_rad
         if joints is None or len(joints) != len(self._arm) or not self._arm.within_limits(joints):
-            raise DeviceError(f"{goal.label}: joints within the limits are needed", code="motion_refused")
+            raise DeviceError(f"{goal.label}: joints within the limits are needed", code=Code.MOTION_REFUSED)
         if not self._client.wait_for_server(timeout_sec=STARTS_S):
             raise DeviceError(
                 f"{goal.label}: nobody offers the action {self._action}",
-                code="not_ready",
+                code=Code.NOT_READY,
                 hint="ros2 control list_controllers; ros2 action list",
             )
         self._stopped.clear()
@@ -137,7 +142,9 @@ class Ros2Robot:
         sent = self._client.send_goal_async(self._message(points))
         motion = _answer(sent, STARTS_S, f"{goal.label}: {self._action}")
         if not motion.accepted:
-            raise DeviceError(f"{goal.label}: the controller refuses the trajectory", code="motion_refused")
+            raise DeviceError(
+                f"{goal.label}: the controller refuses the trajectory", code=Code.MOTION_REFUSED
+            )
         self._motion = motion
         try:
             answer = self._ended(goal.label, motion, total_s + SPARE_S)
@@ -148,7 +155,8 @@ class Ros2Robot:
         if self._stopped.is_set() or answer.status == CANCELED or off > NEAR_RAD:
             said = answer.result.error_string or f"code {answer.result.error_code}"
             raise DeviceError(
-                f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it ({said[:200]})", code="stopped"
+                f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it ({said[:200]})",
+                code=Code.STOPPED,
             )
 
     def read_pose(self) -> Reading:
@@ -209,7 +217,7 @@ class Ros2Robot:
             if time.monotonic() > end:
                 raise DeviceError(
                     f"joint states of {', '.join(sorted(found.value)[:20])}, expected {', '.join(names)}",
-                    code="no_joints",
+                    code=Code.NO_JOINTS,
                     hint="the description and the controller must be of one robot",
                 )
             asked_s = np.nextafter(found.stamp_s, np.inf)
@@ -242,7 +250,7 @@ class Ros2Robot:
                 raise
             if time.monotonic() > end:
                 motion.cancel_goal_async()
-                raise DeviceError(f"{label}: not there after {timeout_s:.0f} s", code="stopped")
+                raise DeviceError(f"{label}: not there after {timeout_s:.0f} s", code=Code.STOPPED)
             time.sleep(POLL_S)
         return result.result()
 
@@ -256,7 +264,7 @@ class Ros2Robot:
                 since_s, reference = now_s, joints
             elif now_s - since_s > REST_S:
                 return
-        raise DeviceError("the arm does not come to rest", code="not_at_rest")
+        raise DeviceError("the arm does not come to rest", code=Code.NOT_AT_REST)
 
 
 def profile(
@@ -288,5 +296,5 @@ def _answer(future: Any, timeout_s: float, what: str) -> Any:  # noqa: ANN401 - 
 
     future.add_done_callback(tell)
     if not done.wait(timeout_s):
-        raise DeviceError(f"{what}: no answer within {timeout_s:.0f} s", code="connection_lost")
+        raise DeviceError(f"{what}: no answer within {timeout_s:.0f} s", code=Code.CONNECTION_LOST)
     return future.result()

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
 
+from handeye.codes import Code
 from handeye.errors import DeviceError
 
 RTDE_PORT = 30004
@@ -53,13 +54,13 @@ class RtdeClient:
         try:
             answer = self._ask(REQUEST_VERSION, struct.pack(">H", PROTOCOL_VERSION))
             if answer[:1] != b"\x01":
-                raise DeviceError(f"{self._where}: RTDE version 2 is refused", code="wrong_protocol")
+                raise DeviceError(f"{self._where}: RTDE version 2 is refused", code=Code.WRONG_PROTOCOL)
             names = struct.pack(">d", frequency_hz) + ",".join(outputs).encode()
             self._output_recipe, formats = self._set_up(SETUP_OUTPUTS, names, outputs)
             self._input_recipe, _ = self._set_up(SETUP_INPUTS, input_name.encode(), [input_name])
             self._format = struct.Struct(">" + "".join(FORMATS[name] for name in formats))
             if self._ask(START, b"")[:1] != b"\x01":
-                raise DeviceError(f"{self._where}: RTDE does not start", code="wrong_protocol")
+                raise DeviceError(f"{self._where}: RTDE does not start", code=Code.WRONG_PROTOCOL)
         except BaseException:
             self._socket.close()
             raise
@@ -85,7 +86,7 @@ class RtdeClient:
             if kind != DATA or body[:1] != self._output_recipe:
                 continue
             if len(body) != 1 + self._format.size:
-                raise DeviceError(f"{self._where}: RTDE data of {len(body)} bytes", code="wrong_protocol")
+                raise DeviceError(f"{self._where}: RTDE data of {len(body)} bytes", code=Code.WRONG_PROTOCOL)
             numbers = iter(self._format.unpack(body[1:]))
             return {
                 name: tuple(next(numbers) for _ in range(6)) if name.startswith("actual_") else next(numbers)
@@ -106,18 +107,18 @@ class RtdeClient:
         answer = self._ask(kind, request)
         formats = answer[1:].decode("ascii", "replace").split(",")
         if len(formats) != len(names):
-            raise DeviceError(f"{self._where}: RTDE answers {answer[:80]!r}", code="wrong_protocol")
+            raise DeviceError(f"{self._where}: RTDE answers {answer[:80]!r}", code=Code.WRONG_PROTOCOL)
         for name, form in zip(names, formats, strict=True):
             if form == "IN_USE":
                 raise DeviceError(
                     f"{self._where}: {name} is taken by another program",
-                    code="busy",
+                    code=Code.BUSY,
                     hint="end the other program that drives this robot",
                 )
             if form not in FORMATS:
                 raise DeviceError(
                     f"{self._where}: the controller has no {name}",
-                    code="wrong_protocol",
+                    code=Code.WRONG_PROTOCOL,
                     hint="PolyScope 3.9 or 5.3 and later are needed",
                 )
         return answer[:1], formats
@@ -128,7 +129,7 @@ class RtdeClient:
             answered, answer = self._package()
             if answered == kind and answer:
                 return answer
-        raise DeviceError(f"{self._where}: RTDE does not answer", code="wrong_protocol")
+        raise DeviceError(f"{self._where}: RTDE does not answer", code=Code.WRONG_PROTOCOL)
 
     def _send(self, kind: int, body: bytes) -> None:
         try:
@@ -139,7 +140,7 @@ class RtdeClient:
     def _package(self) -> tuple[int, bytes]:
         size, kind = HEADER.unpack(self._exactly(HEADER.size))
         if size < HEADER.size:
-            raise DeviceError(f"{self._where}: no RTDE: a package of {size} bytes", code="wrong_protocol")
+            raise DeviceError(f"{self._where}: no RTDE: a package of {size} bytes", code=Code.WRONG_PROTOCOL)
         return kind, self._exactly(size - HEADER.size)
 
     def _exactly(self, size: int) -> bytes:
@@ -157,6 +158,6 @@ class RtdeClient:
     def _lost(self, why: object) -> DeviceError:
         return DeviceError(
             f"{self._where}: no connection: {why}",
-            code="connection_lost",
+            code=Code.CONNECTION_LOST,
             hint="check cable, power, network and the robot's address",
         )

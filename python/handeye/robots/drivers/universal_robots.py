@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.robots.drivers.rtde import RTDE_PORT, RtdeClient
 from handeye.robots.protocol import Goal, Reading
@@ -88,7 +89,7 @@ class UniversalRobot:
         if not host or not all(port.isdecimal() for port in (rtde, script) if port):
             raise InputError(
                 f"address {address[:60]!r}, expected the robot's name or address",
-                code="bad_address",
+                code=Code.BAD_ADDRESS,
                 hint="such as ur:192.168.0.2",
             )
         self._host = host
@@ -107,7 +108,7 @@ class UniversalRobot:
             `not_ready` after a protective or emergency stop; `stopped` where it was stopped on its way.
         """
         if goal.joints_rad is None or len(goal.joints_rad) != 6:
-            raise DeviceError(f"{goal.label}: six joint positions are needed", code="motion_refused")
+            raise DeviceError(f"{goal.label}: six joint positions are needed", code=Code.MOTION_REFUSED)
         token = _token()
         program = _MOTION.format(
             who=WHO,
@@ -132,16 +133,18 @@ class UniversalRobot:
                 now = link.receive()
                 _check_ready(now)
                 if now[f"output_int_register_{WHO}"] != token:
-                    raise DeviceError(f"{goal.label}: stopped on its way by another program", code="stopped")
+                    raise DeviceError(
+                        f"{goal.label}: stopped on its way by another program", code=Code.STOPPED
+                    )
                 state = now[f"output_int_register_{STATE}"]
                 if state == REFUSED:
-                    raise DeviceError(f"{goal.label}: outside the safety limits", code="motion_refused")
+                    raise DeviceError(f"{goal.label}: outside the safety limits", code=Code.MOTION_REFUSED)
                 if state == DONE and _rests(now):
                     return
                 # The state of the program may lag behind the registers by a package.
                 stopped = stopped + 1 if state == RUNNING and now["runtime_state"] == STOPPED else 0
                 if stopped > 3:
-                    raise DeviceError(f"{goal.label}: the controller stopped the program", code="stopped")
+                    raise DeviceError(f"{goal.label}: the controller stopped the program", code=Code.STOPPED)
 
     def read_pose(self) -> Reading:
         """Return pose of the flange, whatever tool is set, and joints.
@@ -179,7 +182,7 @@ class UniversalRobot:
                 rests = rests + 1 if _rests(link.receive()) else 0
                 if rests >= 5:
                     return
-        raise DeviceError(f"{self._host}: the arm still moves", code="stop_failed")
+        raise DeviceError(f"{self._host}: the arm still moves", code=Code.STOP_FAILED)
 
     def _connected(self) -> RtdeClient:
         return RtdeClient(self._host, self._rtde_port, OUTPUTS, f"input_int_register_{PULSE}")
@@ -192,7 +195,7 @@ class UniversalRobot:
         except OSError as error:
             raise DeviceError(
                 f"{self._host}:{self._script_port}: no connection: {error}",
-                code="connection_lost",
+                code=Code.CONNECTION_LOST,
                 hint="check cable, power, network and the robot's address",
             ) from error
 
@@ -219,7 +222,7 @@ def _await_program(link: RtdeClient, token: int) -> dict[str, Any]:
         _check_ready(now)
     raise DeviceError(
         "the controller does not run the program",
-        code="not_ready",
+        code=Code.NOT_READY,
         hint="switch the arm on, release the brakes, and choose remote control on the pendant",
     )
 
@@ -229,7 +232,7 @@ def _check_ready(now: dict[str, Any]) -> None:
     if bits:
         raise DeviceError(
             f"a protective, safeguard or emergency stop is active (safety status bits {bits:#x})",
-            code="not_ready",
+            code=Code.NOT_READY,
             hint="see to its cause, unlock it on the pendant, then go on with --resume",
         )
 

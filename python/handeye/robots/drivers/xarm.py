@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.robots.protocol import Goal, Reading
 from handeye.types import Pose
@@ -54,7 +55,7 @@ class XArmRobot:
         self._host, _, port = where.partition(":")
         numbers = (not port or port.isdecimal()) and count in {"", "5", "6", "7"}
         if not self._host or not numbers:
-            raise InputError(f"address {address[:60]!r}, expected HOST:PORT,JOINTS", code="bad_address")
+            raise InputError(f"address {address[:60]!r}, expected HOST:PORT,JOINTS", code=Code.BAD_ADDRESS)
         self._port, self._count = int(port or PORT), int(count or 6)
         self._one_at_a_time = threading.Lock()
         self._number = 0
@@ -71,7 +72,7 @@ class XArmRobot:
         """
         if goal.joints_rad is None or len(goal.joints_rad) != self._count:
             raise DeviceError(
-                f"{goal.label}: {self._count} joint positions are needed", code="motion_refused"
+                f"{goal.label}: {self._count} joint positions are needed", code=Code.MOTION_REFUSED
             )
         self._check_errors()
         self._stopped.clear()
@@ -92,7 +93,7 @@ class XArmRobot:
         if off <= NEAR_RAD and not self._stopped.is_set():
             return
         self._check_errors(goal.label)
-        raise DeviceError(f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it", code="stopped")
+        raise DeviceError(f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it", code=Code.STOPPED)
 
     def read_pose(self) -> Reading:
         """Return the pose that the control box tells, that of the flange without a tool, and the joints.
@@ -148,7 +149,7 @@ class XArmRobot:
             }  # collision with itself, joint limits, speed: the goal is at fault
             raise DeviceError(
                 f"{label}: the control box reports error {error}",
-                code="motion_refused" if refused else "not_ready",
+                code=Code.MOTION_REFUSED if refused else Code.NOT_READY,
                 hint="see to its cause, clear it in UFACTORY Studio, then go on with --resume",
             )
 
@@ -163,7 +164,7 @@ class XArmRobot:
             elif time.monotonic() - since_s > REST_S:
                 return joints
             time.sleep(POLL_S)
-        raise DeviceError("the arm does not come to rest", code="not_at_rest")
+        raise DeviceError("the arm does not come to rest", code=Code.NOT_AT_REST)
 
     def _ask(self, what: int, body: bytes = b"", size: int | None = None) -> bytes:
         """Return the parameters of the answer to a request.
@@ -180,15 +181,17 @@ class XArmRobot:
                 self._forget()
                 raise DeviceError(
                     f"control box {self._host}:{self._port}: {str(error) or type(error).__name__}",
-                    code="connection_lost",
+                    code=Code.CONNECTION_LOST,
                     hint="check cable, power and address; the arm may still finish its motion",
                 ) from error
         if state & REFUSED_BIT or (state & ERROR_BIT and what == MOVE_JOINT):
             raise DeviceError(
-                f"the control box does not take request {what} (state {state:#04x})", code="motion_refused"
+                f"the control box does not take request {what} (state {state:#04x})", code=Code.MOTION_REFUSED
             )
         if size is not None and len(answer) < size:
-            raise DeviceError(f"{len(answer)} bytes for request {what}, expected {size}", code="bad_reading")
+            raise DeviceError(
+                f"{len(answer)} bytes for request {what}, expected {size}", code=Code.BAD_READING
+            )
         return answer if size is None else answer[:size]
 
     def _exchanged(self, what: int, body: bytes) -> tuple[int, bytes]:

@@ -7,6 +7,7 @@ files, whose numbers are counts of motors behind gears.
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots.formats.base import ArmFormat, CorrectedArm, commented
 
@@ -23,7 +24,7 @@ def _readings(arm: CorrectedArm, most: int) -> list[float]:
     """
     if len(arm.described) > most:
         raise InputError(
-            f"{arm.described.name}: {len(arm.described)} joints, at most {most} here", code="other_arm"
+            f"{arm.described.name}: {len(arm.described)} joints, at most {most} here", code=Code.OTHER_ARM
         )
     return [
         -float(offset) * MM_PER_M if slides else -float(np.rad2deg(offset)) + 0.0

@@ -10,6 +10,7 @@ from typing import cast
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots.formats.base import ArmFormat, CorrectedArm
 
@@ -22,12 +23,12 @@ _HINT = "give the file that lerobot-calibrate wrote, with --previous"
 
 def _calibration(arm: CorrectedArm) -> str:
     if arm.previous is None:
-        raise InputError("LeRobot's calibration is changed, not made", code="missing_file", hint=_HINT)
+        raise InputError("LeRobot's calibration is changed, not made", code=Code.MISSING_FILE, hint=_HINT)
     try:
         data: object = json.loads(arm.previous[:MAX_CHARACTERS])
     except (ValueError, RecursionError) as error:
         raise InputError(
-            f"previous calibration: not JSON: {str(error)[:200]}", code="not_json", hint=_HINT
+            f"previous calibration: not JSON: {str(error)[:200]}", code=Code.NOT_JSON, hint=_HINT
         ) from error
     motors = cast("dict[str, object]", data) if isinstance(data, dict) else {}
     for joint, offset in zip(arm.described.joints, arm.joint_offsets, strict=True):
@@ -38,7 +39,7 @@ def _calibration(arm: CorrectedArm) -> str:
             raise InputError(
                 f"previous calibration: no motor {joint.name} with a whole homing_offset, "
                 f"found {', '.join(sorted(map(str, motors)))[:200]}",
-                code="invalid_field",
+                code=Code.INVALID_FIELD,
                 hint="name the joints of the description as LeRobot names its motors",
             )
         direction = -1 if motor.get("drive_mode") == 1 else 1
@@ -46,7 +47,7 @@ def _calibration(arm: CorrectedArm) -> str:
         if abs(changed) > LARGEST_OFFSET:
             raise InputError(
                 f"motor {joint.name}: an offset of {changed} steps, the servo keeps at most {LARGEST_OFFSET}",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
                 hint="calibrate it again in the middle of its range",
             )
         motor["homing_offset"] = changed

@@ -7,6 +7,7 @@ same axes; they are moved there.
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots.formats.base import ArmFormat, CorrectedArm, commented, with_z_axes
 from handeye.robots.model import Arm
@@ -48,7 +49,7 @@ def frames_along_axes(arm: Arm) -> list[Pose]:
     if len(arm) != len(LINKS) or any(arm.sliding):
         raise InputError(
             f"{arm.name}: {len(arm)} joints, an arm of Universal Robots has six that turn",
-            code="other_arm",
+            code=Code.OTHER_ARM,
             hint="write urdf, or a table of Denavit and Hartenberg",
         )
     heights = _heights(arm)
@@ -57,7 +58,7 @@ def frames_along_axes(arm: Arm) -> list[Pose]:
     if np.linalg.norm(flange.translation) > _TOLERANCE:
         raise InputError(
             f"{arm.name}: its flange is not on the axis of its last joint, as that of Universal Robots is",
-            code="other_arm",
+            code=Code.OTHER_ARM,
             hint="write urdf, or a table of Denavit and Hartenberg",
         )
     return moves

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, count, positive
 from handeye.types.target.artwork import Artwork, Markers, Squares
@@ -83,7 +84,7 @@ class AprilGrid(Numbered, MarkerCorners):
         if self.spacing_ratio > 10:
             raise InputError(
                 f"aprilgrid: spacing_ratio {self.spacing_ratio:g}, expected at most 10",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
                 hint="it is a ratio to the side of a tag, not a length",
             )
         check_point_count(4 * self.rows * self.columns, "aprilgrid")
@@ -91,7 +92,7 @@ class AprilGrid(Numbered, MarkerCorners):
         if not self.dictionary.startswith("DICT_APRILTAG_"):
             raise InputError(
                 f"aprilgrid: dictionary {self.dictionary}, expected a family such as DICT_APRILTAG_36h11",
-                code="unknown_dictionary",
+                code=Code.UNKNOWN_DICTIONARY,
             )
 
     def _marker_count(self) -> int:

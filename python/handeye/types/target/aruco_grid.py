@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, count, positive
 from handeye.types.target.artwork import Artwork, Markers
@@ -76,7 +77,7 @@ class ArucoGrid(Numbered, MarkerCorners):
         if self.separation_m > LARGEST_RATIO * self.marker_m:
             raise InputError(
                 f"{what}: separation_m {self.separation_m:g}, expected at most {LARGEST_RATIO} marker_m",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
                 hint="both are lengths in metres",
             )
         check_point_count(4 * self.rows * self.columns, what)

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.plain import read_document, without_none
@@ -174,7 +175,7 @@ class Target(ABC):
         if member is None:
             raise InputError(
                 f"target: family {family!r}, expected one of {', '.join(sorted(Target.members))}",
-                code="unknown_target",
+                code=Code.UNKNOWN_TARGET,
             )
         return member
 
@@ -195,7 +196,7 @@ class Target(ABC):
         if unknown:
             raise InputError(
                 f"target: {family} has no field {unknown[0]!r}, expected {', '.join(names)}",
-                code="invalid_field",
+                code=Code.INVALID_FIELD,
             )
         return read_document(table, member, f"target: {family}")
 
@@ -214,7 +215,7 @@ def check_point_count(points: int, what: str) -> None:
         More than 100 000 points.
     """
     if points > MAX_POINTS:
-        raise InputError(f"{what}: {points} points, expected at most {MAX_POINTS}", code="out_of_range")
+        raise InputError(f"{what}: {points} points, expected at most {MAX_POINTS}", code=Code.OUT_OF_RANGE)
 
 
 def grid(rows: int, columns: int, pitch_m: float) -> FloatArray:

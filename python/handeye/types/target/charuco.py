@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, count, positive
 from handeye.types.target.artwork import Artwork, Markers, Squares, chequered
@@ -77,7 +78,7 @@ class Charuco(Numbered):
         if self.marker_m >= self.square_m:
             raise InputError(
                 f"charuco: marker_m {self.marker_m:g}, expected less than square_m {self.square_m:g}",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
             )
         check_point_count((self.rows - 1) * (self.columns - 1), "charuco")
         self._check_numbers()

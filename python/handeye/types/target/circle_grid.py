@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, count, positive
 from handeye.types.target.artwork import Artwork, Discs
@@ -76,7 +77,7 @@ class CircleGrid(Target):
         if self.diameter_m >= nearest:
             raise InputError(
                 f"{what}: diameter_m {self.diameter_m:g}, expected less than {nearest:g} (or circles touch)",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
             )
         if self.marked_diameter_m is not None:
             self._check_marked(float(nearest))
@@ -85,12 +86,12 @@ class CircleGrid(Target):
         marked_diameter = positive(self.marked_diameter_m or 0.0, "circle_grid: marked_diameter_m")
         object.__setattr__(self, "marked_diameter_m", marked_diameter)
         if self.marked is None:
-            raise InputError("circle_grid: marked_diameter_m without marked", code="invalid_field")
+            raise InputError("circle_grid: marked_diameter_m without marked", code=Code.INVALID_FIELD)
         if not self.diameter_m < marked_diameter < 2 * nearest - self.diameter_m:
             raise InputError(
                 f"circle_grid: marked_diameter_m {marked_diameter:g}, expected more than diameter_m "
                 f"{self.diameter_m:g} and not so much that circles touch",
-                code="out_of_range",
+                code=Code.OUT_OF_RANGE,
             )
 
     def _layout(self) -> FloatArray:

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, IndexArray, count
 from handeye.types.target.base import Target
@@ -116,18 +117,18 @@ class Numbered(Coded):
                 raise InputError(
                     f"{what}: markers {self.first_id} to {self.first_id + number - 1}, but {self.dictionary} "
                     f"ends at {highest}",
-                    code="out_of_range",
+                    code=Code.OUT_OF_RANGE,
                 )
             return
         ids = tuple(count(value, 0, highest, f"{what}: ids") for value in self.ids)
         if len(ids) != number or len(set(ids)) != number:
             raise InputError(
                 f"{what}: {len(set(ids))} different numbers in ids, expected {number}, one for each marker",
-                code="invalid_field",
+                code=Code.INVALID_FIELD,
             )
         if self.first_id not in {0, ids[0]}:
             raise InputError(
-                f"{what}: first_id {self.first_id}, but ids begins with {ids[0]}", code="invalid_field"
+                f"{what}: first_id {self.first_id}, but ids begins with {ids[0]}", code=Code.INVALID_FIELD
             )
         follows = ids == tuple(range(ids[0], ids[0] + number))
         object.__setattr__(self, "first_id", ids[0] if follows else 0)

@@ -3,6 +3,7 @@
 In the order of OpenCV's numbers (`cv2.aruco.DICT_4X4_50` is 0), each with the number of its markers.
 """
 
+from handeye.codes import Code
 from handeye.errors import InputError
 
 DICTIONARIES: dict[str, int] = {
@@ -57,12 +58,12 @@ def check_dictionary(name: str, markers: int, what: str) -> None:
     if name not in DICTIONARIES:
         raise InputError(
             f"{what}: dictionary {name!r}, expected one of {', '.join(DICTIONARIES)}",
-            code="unknown_dictionary",
+            code=Code.UNKNOWN_DICTIONARY,
         )
     if markers > DICTIONARIES[name]:
         raise InputError(
             f"{what}: {markers} markers, but {name} has {DICTIONARIES[name]}",
-            code="out_of_range",
+            code=Code.OUT_OF_RANGE,
             hint="name the dictionary that the board was printed with",
         )
 
@@ -78,6 +79,6 @@ def dictionary_of_number(number: int, what: str) -> str:
     names = list(DICTIONARIES)
     if not 0 <= number < len(names):
         raise InputError(
-            f"{what}: dictionary {number}, expected 0 to {len(names) - 1}", code="unknown_dictionary"
+            f"{what}: dictionary {number}, expected 0 to {len(names) - 1}", code=Code.UNKNOWN_DICTIONARY
         )
     return names[number]
