@@ -22,7 +22,8 @@ from handeye.estimation import Estimate, Measurements, make_estimator, require_d
 from handeye.estimation.faults import examine
 from handeye.estimation.shift import Check, check_views, plan_check
 from handeye.types import Recording, View
-from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.calibration import ModelName
+from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
     from rich.console import Console

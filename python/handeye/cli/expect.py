@@ -15,7 +15,7 @@ from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.planning.constraints import ViewLimits
 from handeye.types import Mounting
-from handeye.types.calibration import MM_PER_M
+from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -33,8 +33,9 @@ from handeye.planning.prediction import Sight
 from handeye.planning.touch import touch_criterion
 from handeye.robots import ArmKinematics
 from handeye.session.deciding import Considered
-from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.calibration import ModelName
 from handeye.types.touch import TouchMap
+from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -14,7 +14,7 @@ from handeye.planning.ordering import METRES_PER_RADIAN, Measure, Route, travel_
 from handeye.planning.prediction import Sight
 from handeye.robots import ArmKinematics
 from handeye.types import View
-from handeye.types.calibration import MM_PER_M
+from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -38,7 +38,8 @@ from handeye.session.starting import preview
 from handeye.session.store import SessionStore
 from handeye.studies.rig_cell import rig_cell
 from handeye.types import Mounting
-from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.calibration import ModelName
+from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
     from rich.console import Console

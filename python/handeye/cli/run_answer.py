@@ -15,7 +15,8 @@ from handeye.session.deciding import EndReason
 from handeye.session.loop import End
 from handeye.session.prepared import Prepared
 from handeye.session.settings import Configuration
-from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.calibration import ModelName
+from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -13,7 +13,8 @@ from handeye.errors import ExitCode
 from handeye.estimation import Measurements, make_estimator, require_determined
 from handeye.estimation.faults import examine
 from handeye.estimation.probing import verify as compared
-from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.calibration import ModelName
+from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -11,8 +11,8 @@ from handeye.importing import Opened
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Unobservable
+from handeye.types.units import MM_PER_M
 
-MM_PER_M = 1000.0
 MOUNTINGS = {Mounting.EYE_IN_HAND: "camera in the hand", Mounting.EYE_TO_HAND: "camera beside the robot"}
 
 

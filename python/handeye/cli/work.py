@@ -8,8 +8,8 @@ from cyclopts import Parameter
 from handeye.cli.failures import UsageError
 from handeye.estimation.touch import Depth
 from handeye.estimation.work import USUAL_TOOL_M, Work
-from handeye.types.calibration import MM_PER_M
 from handeye.types.touch import TouchMap, WorkBox
+from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

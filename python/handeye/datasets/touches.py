@@ -34,10 +34,10 @@ from handeye.types.plain import Document, read_document
 from handeye.types.pose import Pose
 from handeye.types.probing import Probing, Tip, Touch
 from handeye.types.rig import Body
+from handeye.types.units import MM_PER_M
 
 MAX_BYTES = 1024 * 1024
 MAX_TOUCHES = 1000
-MM_PER_M = 1000.0
 
 
 class _TipDocument(Document):

@@ -26,9 +26,10 @@ from handeye.errors import DegenerateError, InputError
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.rig import RigCalibration
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M, Calibration
+from handeye.types.calibration import Calibration
 from handeye.types.pose import inverses
 from handeye.types.recording import Recording
+from handeye.types.units import MM_PER_M
 
 # Relative gap between cost and bound that counts as none; costs are in units of the noise.
 CLOSED_GAP = 1e-6

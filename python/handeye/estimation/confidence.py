@@ -7,7 +7,8 @@ import numpy as np
 
 from handeye.estimation.f_distribution import f_quantile
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M, Calibration
+from handeye.types.calibration import Calibration
+from handeye.types.units import MM_PER_M
 
 
 @dataclass(frozen=True, eq=False)

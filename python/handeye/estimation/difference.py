@@ -7,8 +7,8 @@ import numpy as np
 
 from handeye.estimation.f_distribution import f_cumulative
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M
 from handeye.types.pose import Pose
+from handeye.types.units import MM_PER_M
 
 # A difference less likely than this by chance is said to be one.
 UNLIKELY = 0.05

@@ -10,8 +10,8 @@ from handeye.export.frames import REP_103_OPTICAL, Frames
 from handeye.export.result import Result
 from handeye.types import Mounting, Pose
 from handeye.types.arrays import FloatArray
+from handeye.types.units import MM_PER_M
 
-_MM_PER_M = 1000.0
 _MOUNTINGS = {
     Mounting.EYE_IN_HAND: "camera in the hand",
     Mounting.EYE_TO_HAND: "camera beside the robot",
@@ -88,7 +88,7 @@ class Mount:
         origin = (
             f" from {result.view_count} views of recording {result.recording}" if result.recording else ""
         )
-        position = f"{result.sigma_translation_m * _MM_PER_M:.3g} mm"
+        position = f"{result.sigma_translation_m * MM_PER_M:.3g} mm"
         rotation = f"{np.rad2deg(result.sigma_rotation_rad):.2g} deg"
         where = _MOUNTINGS[result.mounting]
         remarks = [

@@ -10,7 +10,7 @@ from handeye.estimation.measurements import Measurements
 from handeye.estimation.touch import touch_rows
 from handeye.estimation.work import Work, lay_out, touch_map
 from handeye.planning.stopping import State, Stop, StopReason, StopRule
-from handeye.types.calibration import MM_PER_M
+from handeye.types.units import MM_PER_M
 
 # As for any request: of fewer views nobody knows how well the noise is known.
 FEWEST_VIEWS = 6

@@ -12,8 +12,7 @@ from handeye.printing.shapes import Area, Disc, rectangle
 from handeye.types import CircleGrid, Target
 from handeye.types.arrays import FloatArray
 from handeye.types.target.artwork import Discs, Markers, Squares
-
-MM_PER_M = 1000.0
+from handeye.types.units import MM_PER_M
 
 
 @dataclass(frozen=True, eq=False)

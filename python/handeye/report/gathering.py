@@ -26,7 +26,8 @@ from handeye.report.recipe import recipe
 from handeye.report.regions import USUAL_DISTANCES_M, at_points, position_axes, rotation_axes, within
 from handeye.report.views import ViewPicture, view_lines, view_picture
 from handeye.types import Camera, Mounting, Pose, Recording, Target
-from handeye.types.calibration import MM_PER_M, Calibration, ModelName
+from handeye.types.calibration import Calibration, ModelName
+from handeye.types.units import MM_PER_M
 
 # Formats that a report shows, ready to be copied.
 SHOWN_EXPORTS = ("ros2", "urdf", "easy_handeye2", "opencv")

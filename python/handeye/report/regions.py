@@ -10,7 +10,7 @@ from handeye.estimation.f_distribution import f_quantile
 from handeye.report.document import AtPoint, PositionAxis, RotationAxis, Within
 from handeye.report.wording import direction, figures, in_camera, turning_camera
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M
+from handeye.types.units import MM_PER_M
 
 # Distances that are shown where nothing is known about the work.
 USUAL_DISTANCES_M = (0.3, 0.6, 1.0)

@@ -10,8 +10,8 @@ from handeye.importing import OpenedRig
 from handeye.report.page import rendered
 from handeye.report.wording import figures, fixed
 from handeye.types import Pose
-from handeye.types.calibration import MM_PER_M
 from handeye.types.kinematics import Kinematics
+from handeye.types.units import MM_PER_M
 from handeye.validation import metrics
 
 _FRAME = "the optical frame: x right, y down, z forward"

@@ -10,7 +10,8 @@ from handeye.estimation.estimate import side_of_chain
 from handeye.report.document import ViewLine
 from handeye.types import Camera, Mounting, Pose, View
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M, Calibration, RobotSide
+from handeye.types.calibration import Calibration, RobotSide
+from handeye.types.units import MM_PER_M
 
 
 @dataclass(frozen=True, eq=False)

@@ -112,7 +112,7 @@ def refusal(robot: Robot, unreachable: Goal) -> list[str]:
         calls.run(SECONDS, robot.move_to, unreachable)
     except DeviceError as error:
         if error.code != Code.MOTION_REFUSED:
-            return [f"{unreachable.label}: refused with code {error.code!r}, expected 'motion_refused'"]
+            return [f"{unreachable.label}: refused with code {error.code}, expected {Code.MOTION_REFUSED}"]
     else:
         return [f"{unreachable.label}: went, or says so, where it must refuse"]
     after = read(robot)

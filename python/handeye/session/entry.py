@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from handeye.codes import Code
 from handeye.types import CameraView, Pose, Station, View
 from handeye.types.plain import Document, read_document, without_none
 
@@ -22,12 +21,12 @@ class Failure(StrEnum):
     NOT_CONFIRMED = "not_confirmed"
     MOTION_REFUSED = "motion_refused"
     ROBOT_FAILED = "robot_failed"
-    BAD_READING = Code.BAD_READING
+    BAD_READING = "bad_reading"
     NOT_MOVED = "not_moved"
     ELSEWHERE = "elsewhere"
     CAMERA_FAILED = "camera_failed"
     CAMERA_TIMEOUT = "camera_timeout"
-    BAD_IMAGE = Code.BAD_IMAGE
+    BAD_IMAGE = "bad_image"
     STALE_IMAGE = "stale_image"
     POOR_IMAGE = "poor_image"
     NOT_FOUND = "not_found"

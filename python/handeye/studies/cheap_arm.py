@@ -24,7 +24,7 @@ from handeye.robots import Arm, ArmKinematics, Joint
 from handeye.robots.displaced import displaced, random_displacements
 from handeye.simulation.mixed_arm import log_uniform, random_twist
 from handeye.types import Camera, Chessboard, Mounting, Pose, View
-from handeye.types.calibration import MM_PER_M
+from handeye.types.units import MM_PER_M
 
 BOARD = Chessboard(5, 7, 0.02)
 SIZE_PX = (1280, 720)

@@ -22,7 +22,7 @@ from handeye.session.settings import Configuration, Simulation
 from handeye.studies.comparison import POLICIES
 from handeye.types import Pose
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M
+from handeye.types.units import MM_PER_M
 from handeye.validation.metrics import summary
 
 _WORDS = {

@@ -11,7 +11,8 @@ from handeye.estimation import Measurements, make_estimator
 from handeye.robots import ArmKinematics
 from handeye.simulation.cells import MIXTURES, CellOptions, ErrorKind, simulate, simulated_arm
 from handeye.studies.protocol import true_hand_eye
-from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.calibration import ModelName
+from handeye.types.units import MM_PER_M
 from handeye.validation import metrics
 
 RUNS_PER_PIECE = 10

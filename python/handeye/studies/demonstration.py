@@ -14,7 +14,8 @@ from handeye.studies.comparison import POLICIES, Comparison, run_policy
 from handeye.studies.protocol import Protocol, Trial, draw_trials
 from handeye.types import Pose, Recording
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.calibration import ModelName
+from handeye.types.units import MM_PER_M
 from handeye.validation.metrics import absolute_error
 
 # Starts that one process does in a row.

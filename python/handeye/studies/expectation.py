@@ -28,7 +28,7 @@ from handeye.session.prepared import Prepared
 from handeye.session.settings import Configuration
 from handeye.types import Pose, Target
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M
+from handeye.types.units import MM_PER_M
 
 # Views that are simulated; what further ones leave is predicted from these.
 MEASURED = 12

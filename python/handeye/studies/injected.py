@@ -12,7 +12,8 @@ from handeye.estimation import Measurements
 from handeye.studies.comparison import POLICIES, Comparison, SetResult, compare, piece_count
 from handeye.studies.protocol import Protocol, Trial, true_hand_eye
 from handeye.types import Pose, Recording, View
-from handeye.types.calibration import MM_PER_M, ModelName, RobotSide
+from handeye.types.calibration import ModelName, RobotSide
+from handeye.types.units import MM_PER_M
 from handeye.validation.metrics import summary
 
 METRICS = ("translation_mm", "rotation_deg")

@@ -27,6 +27,7 @@ from handeye.studies.planted import EXPECTED, Mistake, can_be_planted, made_up, 
 from handeye.types import Mounting, Pose, Recording, Truth
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Calibration, ModelName
+from handeye.types.units import MM_PER_M
 from handeye.validation import metrics
 
 RUNS_PER_PIECE = 4
@@ -35,7 +36,6 @@ FEWEST, MOST = 8, 20
 MOST_DRAWS = 20
 # Metres, pixels and elements of rotations that differ by less are rounded.
 SAME = 1e-9
-MM_PER_M = 1000.0
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,10 @@ from handeye.estimation.faults.kinds.numbers import Numbers
 from handeye.estimation.faults.kinds.sheared_pictures import sheared as sheared_by
 from handeye.estimation.faults.kinds.wrong_unit import larger
 from handeye.notations import NOTATIONS
-from handeye.studies.planted_views import MM_PER_M, at, between
+from handeye.studies.planted_views import at, between
 from handeye.types import Camera, Mounting, Pose, Recording
 from handeye.types.arrays import FloatArray
+from handeye.types.units import MM_PER_M
 
 # Notations as people mix them up: written in the one, read in the other.
 MIXED_UP = (

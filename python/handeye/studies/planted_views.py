@@ -9,8 +9,8 @@ from handeye.errors import InputError
 from handeye.estimation.faults.relabel import reflections, turns
 from handeye.types import Mounting, Pose, Recording, View
 from handeye.types.arrays import FloatArray
+from handeye.types.units import MM_PER_M
 
-MM_PER_M = 1000.0
 MOVING_MM, MOVING_DEG = (5.0, 15.0), (0.3, 1.5)
 GROSS_MM, GROSS_DEG = (40.0, 300.0), (4.0, 40.0)
 

@@ -33,8 +33,9 @@ from handeye.simulation.cells import (
 )
 from handeye.types import Chessboard, Mounting, Pose, View
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.calibration import ModelName
 from handeye.types.touch import WorkBox
+from handeye.types.units import MM_PER_M
 
 # What is seen and touched: a part of this size, known exactly.
 PART = Chessboard(4, 4, 0.02)

@@ -11,10 +11,10 @@ from handeye.types.camera import Camera
 from handeye.types.mounting import Mounting
 from handeye.types.pose import Pose
 from handeye.types.touch import TouchMap
+from handeye.types.units import MM_PER_M
 
 # Order of the rows of every covariance of a twist.
 TWIST_ORDER = ("tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")
-MM_PER_M = 1000.0
 
 
 class ModelName(StrEnum):

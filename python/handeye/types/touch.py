@@ -8,8 +8,8 @@ import numpy as np
 from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.types.arrays import FloatArray, finite_array
+from handeye.types.units import MM_PER_M
 
-_MM_PER_M = 1000.0
 # What share of the variance a thing must have to be named as what limits it.
 _WORTH_NAMING = 0.1
 _ADVICE = {
@@ -39,7 +39,7 @@ class WorkBox:
         upper = finite_array(self.upper_m, (3,), "box of work")
         if (lower >= upper).any():
             raise InputError(
-                f"box of work: from {lower * _MM_PER_M} to {upper * _MM_PER_M} mm, expected the lower first",
+                f"box of work: from {lower * MM_PER_M} to {upper * MM_PER_M} mm, expected the lower first",
                 code=Code.OUT_OF_RANGE,
                 hint="give the least x y z, then the largest x y z",
             )
@@ -47,7 +47,7 @@ class WorkBox:
     @classmethod
     def of_mm(cls, corners_mm: tuple[float, float, float, float, float, float]) -> "WorkBox":
         """Take least x y z and largest x y z in millimetres."""
-        x, y, z, x2, y2, z2 = (value / _MM_PER_M for value in corners_mm)
+        x, y, z, x2, y2, z2 = (value / MM_PER_M for value in corners_mm)
         return cls((x, y, z), (x2, y2, z2))
 
     def grid(self, per_axis: int) -> FloatArray:
@@ -125,21 +125,21 @@ class TouchMap:
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON, with units in the keys."""
         return {
-            "mean_mm": self.mean_m * _MM_PER_M,
-            "worst_mm": self.worst_m * _MM_PER_M,
-            "worst_at_mm": (self.worst_at_m * _MM_PER_M).tolist(),
-            "as_reported_mm": self.as_reported_m * _MM_PER_M,
+            "mean_mm": self.mean_m * MM_PER_M,
+            "worst_mm": self.worst_m * MM_PER_M,
+            "worst_at_mm": (self.worst_at_m * MM_PER_M).tolist(),
+            "as_reported_mm": self.as_reported_m * MM_PER_M,
             "probability": 0.95,
-            "box_mm": [[v * _MM_PER_M for v in self.box.lower_m], [v * _MM_PER_M for v in self.box.upper_m]],
+            "box_mm": [[v * MM_PER_M for v in self.box.lower_m], [v * MM_PER_M for v in self.box.upper_m]],
             "box_stated": self.stated,
-            "tool_mm": (self.tool_m * _MM_PER_M).tolist(),
+            "tool_mm": (self.tool_m * MM_PER_M).tolist(),
             "depth": self.depth,
             "limits": dict(self.limits),
             "advice": self.advice,
             "out_of_reach": self.out_of_reach,
             "out_of_sight": self.out_of_sight,
             "map": [
-                {"point_mm": (point * _MM_PER_M).tolist(), "radius_mm": float(radius) * _MM_PER_M}
+                {"point_mm": (point * MM_PER_M).tolist(), "radius_mm": float(radius) * MM_PER_M}
                 for point, radius in zip(self.points_m, self.radii_m, strict=True)
             ],
         }

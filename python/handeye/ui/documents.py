@@ -1,5 +1,6 @@
 """What a page is told, as plain values: the scene, the candidates, what is known, the last picture."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -19,7 +20,8 @@ from handeye.robots.protocol import Goal, Reading
 from handeye.session.deciding import Considered
 from handeye.types import Camera, Mounting, Pose, Target, View
 from handeye.types.arrays import FloatArray, IndexArray
-from handeye.types.calibration import MM_PER_M, ModelName
+from handeye.types.calibration import ModelName
+from handeye.types.units import MM_PER_M
 
 # How large the longest half axis of an ellipsoid is drawn, as a part of how far apart the views are but at
 # least of the other, and an arrow of the usual residual.
@@ -114,7 +116,7 @@ def candidates(shown: Shown) -> dict[str, Any]:
     reasons = sorted(set(considered.reasons))
     return {
         "poses": _many(_moving(shown, poses)),
-        "gains": [None if gain != gain else gain for gain in np.round(considered.gains, 4).tolist()],  # noqa: PLR0124
+        "gains": [None if math.isnan(gain) else gain for gain in np.round(considered.gains, 4).tolist()],
         "names": [candidate.name for candidate in pool.candidates],
         "chosen": shown.chosen,
         "ruled_out": _many(_moving(shown, considered.ruled_out)),

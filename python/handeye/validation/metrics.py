@@ -17,8 +17,8 @@ from handeye.estimation import Estimate, Measurements
 from handeye.estimation.f_distribution import f_quantile
 from handeye.types import Pose
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M
 from handeye.types.pose import inverses
+from handeye.types.units import MM_PER_M
 
 
 @dataclass(frozen=True)

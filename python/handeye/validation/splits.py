@@ -23,7 +23,8 @@ from handeye.errors import HandeyeError, InputError
 from handeye.estimation import Estimate, Measurements, make_estimator, require_determined
 from handeye.types import Recording
 from handeye.types.arrays import FloatArray
-from handeye.types.calibration import MM_PER_M, Finding, ModelName
+from handeye.types.calibration import Finding, ModelName
+from handeye.types.units import MM_PER_M
 from handeye.validation import metrics
 from handeye.validation.findings import findings
 from handeye.validation.metrics import summary

@@ -6,13 +6,14 @@ import numpy as np
 
 from handeye.estimation.faults.explanation import Explanation
 from handeye.estimation.faults.kinds import gross_pose, view_moving
-from handeye.estimation.faults.kinds.words import MM_PER_M, listed, size_of
+from handeye.estimation.faults.kinds.words import listed, size_of
 from handeye.estimation.faults.selection import CLEAR, weigh
 from handeye.estimation.faults.stations import inverted, twists
 from handeye.estimation.measurements import Measurements
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import Finding
 from handeye.types.mounting import Mounting
+from handeye.types.units import MM_PER_M
 
 # A picture taken while the arm moved is off by what it moves in a fraction of a second; more is another
 # mistake.

@@ -10,8 +10,7 @@ import numpy as np
 from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.robots.formats.base import ArmFormat, CorrectedArm, commented
-
-MM_PER_M = 1000.0
+from handeye.types.units import MM_PER_M
 
 
 def _readings(arm: CorrectedArm, most: int) -> list[float]:

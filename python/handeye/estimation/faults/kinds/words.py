@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from handeye.types.arrays import FloatArray
+from handeye.types.units import MM_PER_M
 
-MM_PER_M = 1000.0
 MOST_LISTED = 6
 
 
