@@ -108,7 +108,7 @@ MUTANTS = (
     Mutant("stale frames", "cameras/capture.py", "STALE_FRAMES = 5", "STALE_FRAMES = 0", "cameras/test_capture.py"),
     Mutant("the same picture twice", ATTEMPT, 'if digest in digests:\n            return Missed(Failure.STALE_IMAGE, "the same points', 'if False:\n            return Missed(Failure.STALE_IMAGE, "the same points', T_SAFETY),
     Mutant("a picture that repeats itself", "session/judging.py", "UNCHANGED_PX = 0.5", "UNCHANGED_PX = 0.0", T_SAFETY),
-    Mutant("frames are checked", "cameras/protocol.py", "if not isinstance(answer, Frame):", "if False:", T_SAFETY),
+    Mutant("frames are checked", "cameras/protocol.py", "if not isinstance(answer, Frame):", "if False:", "cameras/test_protocol.py"),
     Mutant("folder: settled", FOLDER, "SETTLED_S = 0.2", "SETTLED_S = 0.0", T_FOLDER),
     Mutant("folder: what lay there", FOLDER, "if old.get(name) == state:", "if False:", T_FOLDER),
     Mutant("folder: being written", FOLDER, "if name in growing:", "if False:", T_FOLDER),

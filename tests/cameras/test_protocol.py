@@ -52,3 +52,9 @@ def test_what_is_no_frame_is_an_error_of_the_device(answer: object) -> None:
 
 def test_subclasses_of_arrays_become_plain_ones() -> None:
     assert type(checked_frame(holding(IMAGE.view(Kept))).image) is np.ndarray
+
+
+def test_what_only_looks_like_a_frame_is_none() -> None:
+    alike = SimpleNamespace(image=IMAGE, points=None, timestamp_s=None)
+    with pytest.raises(DeviceError, match="expected Frame"):
+        checked_frame(alike)

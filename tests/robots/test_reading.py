@@ -1,5 +1,6 @@
 """What a robot says of itself is taken only if it can be true, and the usual mistakes are named."""
 
+from types import SimpleNamespace
 from typing import NoReturn
 
 import numpy as np
@@ -146,3 +147,10 @@ def test_arrays_of_numbers_become_plain_ones() -> None:
     joints = np.array([0.1, 0.2], dtype=np.float32)
     found = typed_reading(Reading(Pose.identity(), joints))  # type: ignore[arg-type]
     assert found.joints_rad == tuple(float(value) for value in joints)
+
+
+def test_what_only_looks_like_a_reading_is_none() -> None:
+    """Fields of the right names are not enough: what else comes with them nobody knows."""
+    alike = SimpleNamespace(T_base_flange=Pose.identity(), joints_rad=None)
+    with pytest.raises(DeviceError, match="expected Reading"):
+        typed_reading(alike)
