@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import time
 from pathlib import Path
 
 import numpy as np
@@ -26,10 +27,12 @@ pytestmark = pytest.mark.filterwarnings("ignore:This process:DeprecationWarning"
 def test_killed_at_any_instant_it_ends_as_if_undisturbed(tmp_path: Path) -> None:
     faults = FaultRates(refused=0.1, not_found=0.15)
     configuration = configured(3, faults=faults)
+    began = time.monotonic()
     run(configuration, tmp_path / "undisturbed")
+    took_s = time.monotonic() - began
     undisturbed = Outcome.of(tmp_path / "undisturbed")
     assert any("failure" in entry for entry in undisturbed.journal)
-    kills = run_killed(configuration, tmp_path / "killed", np.random.default_rng(1), 0.04)
+    kills = run_killed(configuration, tmp_path / "killed", np.random.default_rng(1), took_s / 8)
     assert kills >= 3
     assert Outcome.of(tmp_path / "killed") == undisturbed
 
