@@ -91,13 +91,23 @@ impl Factor {
     }
 }
 
-/// `row - factor * other`, block by block.
+/// Rows that are taken off together.
+const TOGETHER: usize = 4;
+
+/// `row - sum of factors * others`, block by block.
 #[inline(always)]
-fn take_off<S: Simd>(simd: S, row: &mut [Block], factor: f64, other: &[Block]) {
-    let factor = simd.splat(factor);
-    for (block, other) in row.iter_mut().zip(other) {
+fn take_off<S: Simd, const COUNT: usize>(
+    simd: S,
+    row: &mut [Block],
+    factors: [f64; COUNT],
+    others: [&[Block]; COUNT],
+) {
+    for (b, block) in row.iter_mut().enumerate() {
         for at in (0..MAX_LANES).step_by(S::LANES) {
-            let left = factor.neg_mul_add(simd.load(&other[at..]), simd.load(&block[at..]));
+            let mut left = simd.load(&block[at..]);
+            for (factor, other) in factors.iter().zip(others) {
+                left = simd.splat(*factor).neg_mul_add(simd.load(&other[b][at..]), left);
+            }
             left.store(&mut block[at..]);
         }
     }
@@ -114,19 +124,31 @@ impl Kernel for Eliminate<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> bool {
         let Factor { size, blocks, upper, .. } = self.factor;
-        for k in 0..*size {
-            let (done, rest) = upper.split_at_mut((k + 1) * *blocks);
-            let row = &done[k * *blocks..];
-            let entries = row.as_flattened();
-            if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&entries[k]) {
-                return false;
+        let (size, blocks) = (*size, *blocks);
+        for k in (0..size).step_by(TOGETHER) {
+            let end = (k + TOGETHER).min(size);
+            let (done, rest) = upper.split_at_mut(end * blocks);
+            let done = &mut done[k * blocks..];
+            let mut inverses = [0.0; TOGETHER];
+            for p in k..end {
+                let (row, others) = done[(p - k) * blocks..].split_at_mut(blocks);
+                let entries = row.as_flattened();
+                if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&entries[p]) {
+                    return false;
+                }
+                inverses[p - k] = 1.0 / entries[p];
+                for (other, i) in others.chunks_exact_mut(blocks).zip(p + 1..) {
+                    let first = i / MAX_LANES;
+                    take_off(simd, &mut other[first..], [entries[i] * inverses[p - k]], [&row[first..]]);
+                }
             }
-            let inverse = 1.0 / entries[k];
-            for (line, (i, entry)) in
-                rest.chunks_exact_mut(*blocks).zip(entries.iter().enumerate().skip(k + 1))
-            {
+            // Rows are left below only where the block is full.
+            let rows: [&[Block]; TOGETHER] =
+                std::array::from_fn(|p| done.get(p * blocks..(p + 1) * blocks).unwrap_or_default());
+            for (line, i) in rest.chunks_exact_mut(blocks).zip(end..) {
                 let first = i / MAX_LANES;
-                take_off(simd, &mut line[first..], entry * inverse, &row[first..]);
+                let factors = std::array::from_fn(|p| rows[p].as_flattened()[i] * inverses[p]);
+                take_off(simd, &mut line[first..], factors, rows.map(|row| &row[first..]));
             }
         }
         true
@@ -149,19 +171,34 @@ impl Kernel for Invert<'_> {
         for (k, row) in self.lower.chunks_exact_mut(*blocks).enumerate() {
             row.as_flattened_mut()[k] = 1.0;
         }
-        for k in 0..*size {
-            // This row is done: off those below, which do not wait for each other.
-            let (done, rest) = self.lower.split_at_mut((k + 1) * *blocks);
-            let row = &done[k * *blocks..];
-            let line = upper[k * *blocks..].as_flattened();
-            let inverse = 1.0 / line[k];
-            let filled = k / MAX_LANES + 1;
-            for (other, entry) in rest.chunks_exact_mut(*blocks).zip(&line[k + 1..]) {
-                take_off(simd, other, entry * inverse, &row[..filled]);
+        let (size, blocks) = (*size, *blocks);
+        for k in (0..size).step_by(TOGETHER) {
+            let end = (k + TOGETHER).min(size);
+            let (done, rest) = self.lower.split_at_mut(end * blocks);
+            let done = &mut done[k * blocks..];
+            let pivots = |p: usize| upper[p * blocks..(p + 1) * blocks].as_flattened();
+            for p in k..end {
+                let (row, others) = done[(p - k) * blocks..].split_at_mut(blocks);
+                for (other, i) in others.chunks_exact_mut(blocks).zip(p + 1..) {
+                    let factor = pivots(p)[i] / pivots(p)[p];
+                    take_off(simd, &mut other[..=p / MAX_LANES], [factor], [row]);
+                }
             }
-            let sums = self.inverse.chunks_exact_mut(*blocks);
-            for (i, (sum, entry)) in sums.zip(row.as_flattened()).enumerate().take(k + 1) {
-                take_off(simd, sum, -entry * inverse, &row[..=i / MAX_LANES]);
+            // These rows are done: off those below, which do not wait for each other. Missing ones weigh nothing.
+            let mut rows: [&[Block]; TOGETHER] = [&done[..blocks]; TOGETHER];
+            let mut inverses = [0.0; TOGETHER];
+            for p in k..end {
+                rows[p - k] = &done[(p - k) * blocks..(p - k + 1) * blocks];
+                inverses[p - k] = 1.0 / pivots(p)[p];
+            }
+            let filled = (end - 1) / MAX_LANES + 1;
+            for (other, i) in rest.chunks_exact_mut(blocks).zip(end..) {
+                let factors = std::array::from_fn(|p| pivots(k + p)[i] * inverses[p]);
+                take_off(simd, &mut other[..filled], factors, rows);
+            }
+            for (i, sum) in self.inverse.chunks_exact_mut(blocks).enumerate().take(end) {
+                let factors = std::array::from_fn(|p| -rows[p].as_flattened()[i] * inverses[p]);
+                take_off(simd, &mut sum[..=i / MAX_LANES], factors, rows);
             }
         }
     }

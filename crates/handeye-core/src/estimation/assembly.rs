@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::cell::Cell;
 use super::component::{Component, Effect};
 use super::linearisation::Linearisation;
-use super::mixed::{Mixed, Noise, Prior, Station};
+use super::mixed::{Mixed, Noise, Prior, Settled, Station};
 use crate::simd::{MAX_LANES, VectorUnit};
 
 impl Prior {
@@ -18,12 +18,12 @@ impl Prior {
 }
 
 /// `m m'`.
-fn square(m: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn square(m: &DMatrix<f64>) -> DMatrix<f64> {
     m * m.transpose()
 }
 
 /// Matrices of as many rows, row by row, padded to whole vectors.
-fn in_one(rows: usize, all: &[&DMatrix<f64>]) -> Vec<f64> {
+pub(super) fn in_one(rows: usize, all: &[&DMatrix<f64>]) -> Vec<f64> {
     let across = all.iter().map(|m| m.ncols()).sum::<usize>().next_multiple_of(MAX_LANES);
     let mut out = vec![0.0; rows * across];
     for (r, row) in out.chunks_exact_mut(across.max(1)).enumerate() {
@@ -112,7 +112,13 @@ impl Mixed {
                     row[size] = from.e[r];
                 }
                 let of: Vec<&DMatrix<f64>> = noises.iter().map(|x: &Noise| &x.roots[k]).collect();
-                Station { size: rows_of, rows, roots: in_one(rows_of, &of), pixels: from.pixels.clone() }
+                Station {
+                    size: rows_of,
+                    rows,
+                    roots: in_one(rows_of, &of),
+                    pixels: from.pixels.clone(),
+                    arm: from.flange.clone(),
+                }
             })
             .collect();
         priors.extend(blocks.into_iter().map(|(prior, _)| prior));
@@ -132,6 +138,7 @@ impl Mixed {
             priors,
             given,
             given_right,
+            settled: Settled { rows: 0, information: DMatrix::zeros(size, size), constant: 0.0 },
             unit: VectorUnit::widest(),
         }
     }

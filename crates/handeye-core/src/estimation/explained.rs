@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::mixed::{Mixed, Wanted};
+use super::mixed::{Mixed, Prior, Wanted};
 
 impl Mixed {
     /// The penalised likelihood without a component: its deviations at nothing, its ratios at their start.
@@ -32,7 +32,7 @@ impl Mixed {
                 }
             }
         };
-        let mut rows = 0;
+        let mut rows = self.settled.rows;
         for (k, station) in self.stations.iter().enumerate() {
             rows += station.size;
             let factor = station.pixels.clone().cholesky()?;
@@ -46,10 +46,7 @@ impl Mixed {
                     // What it is here is not told; what it may be is.
                     station.columns(p, self.width) * Self::deviation(&p.levels, t)
                 } else {
-                    let mut values = theta.rows(p.first, p.count).into_owned();
-                    if let Some(mean) = &p.mean {
-                        values -= mean;
-                    }
+                    let values = Self::deviation_from(p, theta);
                     DMatrix::from_column_slice(
                         station.size,
                         1,
@@ -60,9 +57,20 @@ impl Mixed {
                 add(p.of, moved.norm_squared());
             }
         }
+        for p in self.priors.iter().filter(|p| !p.recurring) {
+            let moved = Self::deviation_from(p, theta);
+            let of = self.settled.information.view((p.first, p.first), (p.count, p.count));
+            add(p.of, moved.dot(&(of * &moved)));
+        }
         for (_, sum) in &mut sums {
             *sum /= rows as f64;
         }
         Some(sums)
+    }
+
+    /// By how much parameters are away from their prior's mean.
+    fn deviation_from(p: &Prior, theta: &DVector<f64>) -> DVector<f64> {
+        let values = theta.rows(p.first, p.count).into_owned();
+        p.mean.as_ref().map_or_else(|| values.clone(), |mean| &values - mean)
     }
 }

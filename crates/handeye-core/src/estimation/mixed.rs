@@ -81,6 +81,18 @@ pub(super) struct Station {
     /// Roots of all noises side by side, row by row, padded to whole vectors.
     pub roots: Vec<f64>,
     pub pixels: DMatrix<f64>,
+    /// Derivative of the twists in a twist of the flange, through which all acts that the arm does wrong.
+    pub arm: DMatrix<f64>,
+}
+
+/// Rows in units of a noise that is the same at all levels.
+#[derive(Clone)]
+pub(super) struct Settled {
+    pub rows: usize,
+    /// Information of the parameters in them.
+    pub information: DMatrix<f64>,
+    /// Twice what they add to minus the logarithm of the likelihood, whatever the parameters.
+    pub constant: f64,
 }
 
 /// A cell linearised, with its components.
@@ -100,6 +112,8 @@ pub(super) struct Mixed {
     pub priors: Vec<Prior>,
     pub given: DMatrix<f64>,
     pub given_right: DVector<f64>,
+    /// Rows whose noise is the same at all levels, summed up in what is given.
+    pub settled: Settled,
     pub unit: VectorUnit,
 }
 
@@ -146,6 +160,7 @@ impl Mixed {
             priors: self.priors.iter().map(|p| Prior { squares: of(&p.squares), ..p.clone() }).collect(),
             given: self.given.clone(),
             given_right: self.given_right.clone(),
+            settled: self.settled.clone(),
             ..*self
         }
     }
@@ -202,7 +217,7 @@ impl Mixed {
         let noise: Vec<f64> = self.noises.iter().map(|x| Self::deviation(&x.levels, t)).collect();
         let prior: Vec<f64> = self.priors.iter().map(|x| Self::deviation(&x.levels, t)).collect();
         let mut sum = vec![0.0; (n + 1).next_multiple_of(TOGETHER) * self.width];
-        let mut constant = 0.0;
+        let mut constant = self.settled.constant;
         let (whitened, log_determinant) = self.whitened(&noise, None)?;
         constant += log_determinant;
         dispatch(self.unit, Accumulate::pairs(&whitened.rows, self.width, n + 1, &mut sum));

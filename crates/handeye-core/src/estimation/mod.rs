@@ -26,6 +26,7 @@ mod pixel_field;
 mod pose_measurement;
 mod posterior;
 mod products;
+mod reduction;
 mod sandwich;
 mod slopes;
 mod start;

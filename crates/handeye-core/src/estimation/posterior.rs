@@ -114,7 +114,8 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
     let mut guess = Guess { x: start.0, y: start.1 };
     let mut levels: Option<DVector<f64>> = None;
     let (mut steps, mut rounds, mut converged) = (0, 0, false);
-    let mut mixed = assemble(cell, &guess, &components, &options.weak);
+    let at = |guess: &Guess| assemble(cell, guess, &components, &options.weak).reduced().ok_or_else(singular);
+    let mut mixed = at(&guess)?;
     let mut mode = None;
     while rounds < options.most_rounds {
         rounds += 1;
@@ -133,7 +134,7 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
             break;
         }
         guess = guess.moved(answer.theta.as_slice());
-        mixed = assemble(cell, &guess, &components, &options.weak);
+        mixed = at(&guess)?;
         mode = None;
     }
     let found = match mode {

@@ -37,6 +37,8 @@ impl Kernel for Whiten<'_> {
 
 /// Columns whose products are summed together.
 pub(super) const TOGETHER: usize = 4;
+/// Rows that stay in the nearest cache while all their products are summed.
+const NEAR: usize = 32;
 
 /// Adds the products of columns of one matrix with columns of another, whose rows lie side by side: whole vectors, row
 /// by row; of a matrix with itself (`upper`) those of the upper triangle.
@@ -63,24 +65,52 @@ impl Kernel for Accumulate<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        for i in (0..self.size).step_by(TOGETHER) {
-            let first = if self.upper { i / S::LANES * S::LANES } else { 0 };
-            for at in (first..self.across).step_by(S::LANES) {
-                let mut totals = [simd.splat(0.0); TOGETHER];
-                for (k, total) in totals.iter_mut().enumerate() {
-                    *total = simd.load(&self.sum[(i + k) * self.across + at..]);
+        let Self { width, size, across, upper, sum, .. } = self;
+        let pieces = self.left.chunks(NEAR * width).zip(self.right.chunks(NEAR * across));
+        for (left, right) in pieces {
+            for i in (0..size).step_by(TOGETHER) {
+                let mut at = if upper { i / S::LANES * S::LANES } else { 0 };
+                let rows = || left.chunks_exact(width).map(|row| &row[i..i + TOGETHER]);
+                while at + 2 * S::LANES <= across {
+                    add_products::<S, 2>(simd, rows(), right, across, at, &mut sum[i * across..]);
+                    at += 2 * S::LANES;
                 }
-                let pairs = self.left.chunks_exact(self.width).zip(self.right.chunks_exact(self.across));
-                for (left, right) in pairs {
-                    let values = simd.load(&right[at..]);
-                    for (k, total) in totals.iter_mut().enumerate() {
-                        *total = simd.splat(left[i + k]).mul_add(values, *total);
-                    }
-                }
-                for (k, total) in totals.iter().enumerate() {
-                    total.store(&mut self.sum[(i + k) * self.across + at..]);
+                while at < across {
+                    add_products::<S, 1>(simd, rows(), right, across, at, &mut sum[i * across..]);
+                    at += S::LANES;
                 }
             }
+        }
+    }
+}
+
+/// Adds the products of a few columns of one matrix with as many whole vectors of another, kept in registers.
+#[inline(always)]
+fn add_products<'a, S: Simd, const VECTORS: usize>(
+    simd: S,
+    left: impl Iterator<Item = &'a [f64]>,
+    right: &[f64],
+    across: usize,
+    at: usize,
+    sum: &mut [f64],
+) {
+    let mut totals = [[simd.splat(0.0); VECTORS]; TOGETHER];
+    for (left, right) in left.zip(right.chunks_exact(across)) {
+        let mut values = [simd.splat(0.0); VECTORS];
+        for (v, value) in values.iter_mut().enumerate() {
+            *value = simd.load(&right[at + v * S::LANES..]);
+        }
+        for (k, line) in totals.iter_mut().enumerate() {
+            let factor = simd.splat(left[k]);
+            for (total, value) in line.iter_mut().zip(values) {
+                *total = factor.mul_add(value, *total);
+            }
+        }
+    }
+    for (line, sum) in totals.iter().zip(sum.chunks_mut(across)) {
+        for (v, total) in line.iter().enumerate() {
+            let sum = &mut sum[at + v * S::LANES..];
+            (simd.load(sum) + *total).store(sum);
         }
     }
 }

@@ -94,15 +94,19 @@ fn options(described: bool) -> Options {
     Options { assumptions: assumptions(described), weak: WeakPrior::default(), pairs: 8, most_rounds: 8 }
 }
 
+fn mixed_of(truth: &Truth, described: bool) -> Mixed {
+    let guess = Guess { x: truth.x.clone(), y: truth.y.clone() };
+    let all = components::all(&truth.cell, &assumptions(described)).unwrap();
+    let end = truth.cell.columns().end;
+    let weak = (DMatrix::identity(end, end), DVector::zeros(end));
+    Mixed::new(&linearise(&truth.cell, &guess), &all, (&weak.0, &weak.1), &truth.cell)
+}
+
 #[test]
 fn slopes_are_those_of_the_value() {
     for (seed, described) in [(1, true), (2, false)] {
         let truth = made(seed, (&[Body::Flange], &[Body::Base]), 8, 1e-3, described);
-        let guess = Guess { x: truth.x.clone(), y: truth.y.clone() };
-        let all = components::all(&truth.cell, &assumptions(described)).unwrap();
-        let end = truth.cell.columns().end;
-        let weak = (DMatrix::identity(end, end), DVector::zeros(end));
-        let mixed = Mixed::new(&linearise(&truth.cell, &guess), &all, (&weak.0, &weak.1), &truth.cell);
+        let mixed = mixed_of(&truth, described);
         let random = &mut Random::new(seed);
         for _ in 0..4 {
             let t = mixed.start().map(|t| t + random.uniform(-1.0, 1.0));
@@ -120,6 +124,44 @@ fn slopes_are_those_of_the_value() {
                     "{l}: {} {expected}",
                     found.slope[l]
                 );
+            }
+        }
+    }
+}
+
+#[test]
+fn stations_reduced_to_six_rows_say_the_same() {
+    let bodies: (&[Body], &[Body]) = (&[Body::Flange, Body::Base], &[Body::Base, Body::Flange]);
+    let close = |a: &[f64], b: &[f64]| {
+        let size = a.iter().fold(0.0, |size: f64, a| size.max(a.abs()));
+        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-7 * size)
+    };
+    for (seed, described) in [(3, true), (4, false)] {
+        let mut truth = made(seed, bodies, 8, 1e-3, described);
+        let random = &mut Random::new(seed);
+        for m in &mut truth.cell.measurements {
+            m.pose.sensitivity = Matrix6xX::from_fn(1, |_, _| random.uniform(-1.0, 1.0));
+        }
+        let whole = mixed_of(&truth, described);
+        let reduced = mixed_of(&truth, described).reduced().unwrap();
+        assert!(whole.stations.iter().all(|station| station.size == 24));
+        assert!(reduced.stations.iter().all(|station| station.size == 6));
+        assert_eq!(whole.rows(), reduced.rows() + reduced.settled.rows);
+        for _ in 0..4 {
+            let t = whole.start().map(|t| t + random.uniform(-1.0, 1.0));
+            for wanted in [Wanted::Slope, Wanted::Answer] {
+                let (a, b) = (whole.evaluate(&t, wanted).unwrap(), reduced.evaluate(&t, wanted).unwrap());
+                assert!((a.value - b.value).abs() < 1e-7 * a.value.abs(), "{} {}", a.value, b.value);
+                assert!(close(a.slope.as_slice(), b.slope.as_slice()));
+                assert!(close(a.curvature.as_slice(), b.curvature.as_slice()));
+                assert!(close(a.theta.as_slice(), b.theta.as_slice()));
+                assert!(close(a.covariance.as_slice(), b.covariance.as_slice()));
+                assert!(close(a.information.as_slice(), b.information.as_slice()));
+            }
+            let theta = whole.evaluate(&t, Wanted::Slope).unwrap().theta;
+            let both = whole.misfit(&t, &theta).unwrap().into_iter().zip(reduced.misfit(&t, &theta).unwrap());
+            for ((name, a), (_, b)) in both {
+                assert!((a - b).abs() < 1e-7 * a.abs(), "{name}: {a} {b}");
             }
         }
     }
