@@ -9,7 +9,7 @@ import pytest
 from cyclopts import App
 
 from commands import Handeye
-from handeye.cli import boundary
+from handeye.cli import boundary, main
 from handeye.cli.answer import Answer
 from handeye.cli.app import COMMANDS, make_app
 from handeye.cli.options import Common
@@ -196,3 +196,14 @@ def test_a_slip_of_the_fingers_is_understood(handeye: Handeye, typed: str, meant
 def test_help_is_a_command_too(handeye: Handeye) -> None:
     assert "solve" in handeye("help").out
     assert "--notation" in handeye("help", "solve").out
+
+
+def test_linear_algebra_of_a_command_runs_on_one_thread_unless_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["handeye", "--version"])
+    for given, expected in ((None, "1"), ("2", "2")):
+        monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+        if given is not None:
+            monkeypatch.setenv("OPENBLAS_NUM_THREADS", given)
+        with pytest.raises(SystemExit):
+            main()
+        assert os.environ["OPENBLAS_NUM_THREADS"] == expected

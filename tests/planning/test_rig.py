@@ -5,7 +5,8 @@ import pytest
 
 from handeye.errors import InputError
 from handeye.estimation import RigEstimate, RigMeasurements, estimate_rig
-from handeye.planning.candidates import Pool
+from handeye.planning import rig
+from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.prediction import Sight
 from handeye.planning.rig import RigRequest, rig_gains
 from handeye.robots import ArmKinematics, open_arm
@@ -51,6 +52,25 @@ def test_what_is_asked_for_decides(recording: RigRecording) -> None:
     assert not np.allclose(hand, between, equal_nan=True)
     # Two cameras in each other: the arm's error, which they share, takes nothing away.
     assert np.nanmax(between) > 0
+
+
+def test_the_short_list_holds_the_best_of_many(
+    recording: RigRecording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A few points of each target rank the candidates well enough; those listed are looked at as they are."""
+    before = estimated(recording, 6)
+    random = np.random.default_rng(3)
+    postures = np.array([station.joints_rad for station in recording.stations])
+    joints = postures[random.integers(0, len(postures), 300)] + random.normal(0.0, 0.15, (300, 6))
+    poses = KNOWN.forward(joints)
+    pool = Pool(tuple(Candidate(f"c{i}", Pose(poses[i]), tuple(q)) for i, q in enumerate(joints)))
+    listed = rig_gains(before, pool, {}, Sight(margin_px=20.0))
+    monkeypatch.setattr(rig, "SHORTLIST", len(pool))
+    every = rig_gains(before, pool, {}, Sight(margin_px=20.0))
+    assert np.isfinite(every.gains).sum() > 50
+    chosen = np.isfinite(listed.gains)
+    np.testing.assert_allclose(listed.gains[chosen], every.gains[chosen], rtol=1e-9)
+    assert np.nanmax(listed.gains) > 0.98 * np.nanmax(every.gains)
 
 
 def test_shared_error_of_the_robot_is_counted_once(recording: RigRecording) -> None:

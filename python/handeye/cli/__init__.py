@@ -6,6 +6,9 @@ import sys
 
 def main() -> None:
     """Run the command that the arguments name and leave with its exit code."""
+    # Matrices are small: threads of the linear algebra would wait for each other longer than they work, and
+    # what they round would depend on their number.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from handeye.cli.boundary import INTERRUPTED, run  # noqa: PLC0415 - importing this package costs nothing
 
     code = run(sys.argv[1:])

@@ -12,6 +12,8 @@ from handeye.types.pose import Pose
 
 # Least known directions of X and Y along which sigma points are laid, a metre and a radian weighing alike.
 SIGMA_POINT_DIRECTIONS = 4
+# Points that stand for a target where a first ranking is enough.
+COARSE_POINTS = 16
 # Candidates whose covariances are held in memory at a time.
 _BATCH = 1000
 
@@ -50,6 +52,8 @@ class Prediction:
         What is believed now.
     sight
         What a candidate must show.
+    coarse
+        Let a few points, spread over the target, stand for all: for a first ranking of many candidates.
 
     Raises
     ------
@@ -63,19 +67,27 @@ class Prediction:
     (9, 6, 6)
     """
 
-    def __init__(self, estimate: Estimate, sight: Sight) -> None:
+    def __init__(self, estimate: Estimate, sight: Sight, *, coarse: bool = False) -> None:
         self.estimate, self.sight = estimate, sight
         self._belief = _core.Belief(estimate.information)
         left, right = estimate.station_noise.roots(estimate.mounting)
         width, height = estimate.camera.size_px
+        target = estimate.target
+        points, radii_m, fewest = target.points, target.radii_m, sight.fewest or target.point_count
+        pixel_sigma = estimate.candidate_sigma_px
+        if coarse and len(points) > COARSE_POINTS:
+            share = COARSE_POINTS / len(points)
+            chosen = _spread(points, COARSE_POINTS)
+            points, radii_m = points[chosen], radii_m[chosen]
+            fewest, pixel_sigma = max(1, round(share * fewest)), pixel_sigma * share**0.5
         self._predictor = _core.Predictor(
             estimate.camera.lens,
             estimate.camera.parameters,
-            estimate.target.points,
-            estimate.target.radii_m,
+            points,
+            radii_m,
             estimate.X.matrix,
             estimate.Y.matrix,
-            pixel_sigma=estimate.candidate_sigma_px,
+            pixel_sigma=pixel_sigma,
             robot_left=left,
             robot_right=right,
             free_camera=list(estimate.free_camera) or None,
@@ -83,7 +95,7 @@ class Prediction:
             kinematic_count=0 if estimate.arm is None else estimate.arm.constants,
             image_size=None if sight.known else (width, height),
             margin_px=sight.margin_px,
-            fewest=1 if sight.known else sight.fewest or estimate.target.point_count,
+            fewest=1 if sight.known else fewest,
         )
 
     def in_sight(self, motions: FloatArray) -> BoolArray:
@@ -203,6 +215,16 @@ def _sigma_points(estimate: Estimate) -> list[tuple[Pose, Pose]]:
             (Pose.exp(signed[:6]) @ estimate.X, Pose.exp(signed[6:]) @ estimate.Y) for signed in (step, -step)
         ]
     return points
+
+
+def _spread(points: FloatArray, count: int) -> list[int]:
+    """Return places of points (n, 3), each the furthest from those before it; the outermost comes first."""
+    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    away = np.full(len(points), np.inf)
+    while len(chosen) < count:
+        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(away)))
+    return chosen
 
 
 def _hand_eye_covariance(information: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from handeye import _core
 from handeye.codes import Code
-from handeye.errors import InputError
+from handeye.errors import DegenerateError, InputError
 from handeye.estimation import Estimate, RigEstimate
 from handeye.estimation.confidence import Within
 from handeye.planning.candidates import Pool
@@ -165,7 +165,7 @@ def rig_gains(
     }
     for pair, one in pairs.items():
         # What the arm adds is weighed for those on the short list only.
-        gains = Prediction(_without_arm(one), sight).gains(criterion, motions[one.mounting])
+        gains = Prediction(_without_arm(one), sight, coarse=True).gains(criterion, motions[one.mounting])
         if limits is not None:
             gains[np.logical_or(*out_of_limits(one, motions[one.mounting], limits))] = np.nan
         visible[pair] = np.isfinite(gains)
@@ -178,8 +178,10 @@ def rig_gains(
         return RigGains(result)
     short = Pool(tuple(pool.candidates[i] for i in order))
     for pair, one in pairs.items():
-        hidden = obstacles(one, short.motions(one.mounting), sight)
-        visible[pair] = visible[pair][order] & np.array([why is None for why in hidden])
+        there = short.motions(one.mounting)
+        hidden = obstacles(one, there, sight)
+        clear = Prediction(one, sight).in_sight(there) & np.array([why is None for why in hidden])
+        visible[pair] = visible[pair][order] & clear
     informations = _joint(estimate, pairs, short, visible, sight)
     combinations = np.array([_combination(estimate, names) for names in targets])
     before = np.asarray(estimate.fit.posterior.information)
@@ -222,11 +224,13 @@ def _combination(estimate: RigEstimate, names: tuple[str, ...]) -> FloatArray:
 def _log_sizes(informations: FloatArray, combinations: FloatArray) -> FloatArray:
     """(N, C) logarithms of the determinants of the covariances of combinations (C, 6, n)."""
     scale = 1 / np.sqrt(np.diag(informations[0]))
-    roots = np.linalg.cholesky(informations * scale[:, None] * scale)
-    columns = (combinations * scale).reshape(-1, len(scale)).T
-    half = np.linalg.solve(roots, np.broadcast_to(columns, (len(roots), *columns.shape)))
-    blocks = np.swapaxes(half.reshape(len(roots), len(scale), -1, 6), 1, 2)
-    return np.linalg.slogdet(np.swapaxes(blocks, -1, -2) @ blocks)[1]
+    rows = combinations * scale
+    solved = np.linalg.solve(informations * scale[:, None] * scale, rows.reshape(-1, len(scale)).T)
+    blocks = rows @ np.swapaxes(solved.reshape(len(informations), len(scale), -1, 6), 1, 2)
+    signs, logarithms = np.linalg.slogdet(blocks)
+    if np.any(signs <= 0):
+        raise DegenerateError("the information of the stations is singular")
+    return logarithms
 
 
 def _joint(
