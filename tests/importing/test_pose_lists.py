@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 from typing import Any, cast
 
+import cv2
 import numpy as np
 import pytest
 
@@ -150,6 +151,43 @@ def test_one_file_a_picture_and_pictures_below(folder: Path, pictures: tuple[Pat
         assert abs(view.T_base_flange.matrix - pose.matrix).max() < 1e-5
         assert view.image is not None
         assert view.image.startswith("images/")
+
+
+@pytest.mark.parametrize("first", [0, 7])
+def test_poses_may_be_counted_from_another_number(
+    first: int, folder: Path, pictures: tuple[Path, Pose, list[Pose]]
+) -> None:
+    for k, name in enumerate(names(folder), start=1):
+        (folder / name).rename(folder / f"img_{k}.png")
+    written = cv2.FileStorage(str(folder / "robot.yml"), cv2.FILE_STORAGE_WRITE)
+    for k, pose in enumerate(pictures[2], start=first):
+        written.write(f"T_gripper2base_{k}", pose.matrix)
+    written.release()
+    stated = Statement(NOTATIONS["matrix"], Unit.M)
+    opened = open_folder(folder, SourceOptions(camera=PICTURE_CAMERA, stated=stated))
+    assert [warning.message for warning in opened.warnings if warning.code == "counted_otherwise"] == [
+        f"poses are counted from {first}, pictures from 1: matched in order"
+    ]
+    by_name = {view.name: view.T_base_flange for view in opened.recording.views}
+    for k, pose in enumerate(pictures[2], start=1):
+        assert abs(by_name[f"img_{k}"].matrix - pose.matrix).max() < 1e-9
+    # A gap in the count: numbers mean what they say.
+    (folder / "img_2.png").rename(folder / "img_99.png")
+    opened = open_folder(folder, SourceOptions(camera=PICTURE_CAMERA, stated=stated))
+    assert "counted_otherwise" not in {warning.code for warning in opened.warnings}
+
+
+def test_the_command_for_one_file_a_picture_runs(
+    folder: Path, pictures: tuple[Path, Pose, list[Pose]], handeye: Handeye
+) -> None:
+    for k, pose in enumerate(pictures[2], start=1):
+        (folder / f"robot_pose_{k}.csv").write_text(",".join(map(repr, pose.matrix.ravel().tolist())))
+    with pytest.raises(UnstatedError) as caught:
+        open_folder(folder, SourceOptions(camera=PICTURE_CAMERA))
+    options = caught.value.options
+    assert options[:2] == ("--poses", str(folder))
+    (folder / "camera.json").write_text(json.dumps(PICTURE_CAMERA.to_dict()))
+    assert handeye.json("solve", folder, *options)["T_flange_camera"]
 
 
 def test_faults_are_named(folder: Path, pictures: tuple[Path, Pose, list[Pose]]) -> None:

@@ -83,6 +83,7 @@ def read(folder: Path, options: ImportOptions) -> ImageSet | UnreadPoses:
             f"{folder}: no pictures, expected {', '.join(sorted(IMAGE_SUFFIXES))}", code=Code.NO_IMAGES
         )
     rows, file = _rows(folder, pictures, options)
+    named_file = "a file of poses for each" if file == str(folder) else file
     chosen, warnings = _matched(folder, pictures, rows)
     rows = rows.select([row for row, _ in chosen])
     readings = rows.readings(options.stated)
@@ -101,7 +102,7 @@ def read(folder: Path, options: ImportOptions) -> ImageSet | UnreadPoses:
         shots=shots,
         image_size_px=size,
         camera=camera,
-        source=f"pictures and {file} in folder {folder.resolve().name}",
+        source=f"pictures and {named_file} in folder {folder.resolve().name}",
         warnings=(
             *warnings,
             *accuracy_warnings(rows.accuracies, file),
@@ -147,7 +148,7 @@ def _rows(folder: Path, pictures: Sequence[str], options: ImportOptions) -> tupl
             hint="name it with --poses; CSV, text, JSON and YAML are read",
         )
     if len(names) >= max(3, len(pictures)):
-        return _one_a_file(folder, [folder / name for name in names]), names[0]
+        return _one_a_file(folder, [folder / name for name in names]), str(folder)
     found: dict[str, PoseRows] = {}
     failures: list[str] = []
     for name in names[:_MAX_OPENED]:
@@ -233,6 +234,11 @@ def _matched(
     if all(rows.names):
         for key in (str.lower, _base, _stem, _number):
             pairs = _by(key, pictures, rows.names)
+            if len(pairs) == len(pictures) == len(rows):
+                return pairs, []
+            counted = _counted(pictures, rows.names) if key is _number else None
+            if counted is not None:
+                return counted
             if pairs:
                 return pairs, _left_out(pictures, rows, pairs)
     if len(rows) != len(pictures):
@@ -266,6 +272,24 @@ def _stem(name: str) -> str:
 def _number(name: str) -> str:
     digits = re.findall(r"\d+", _stem(name))
     return str(int(digits[-1])) if digits and len(digits[-1]) < 18 else ""
+
+
+def _counted(
+    pictures: Sequence[str], names: Sequence[str]
+) -> tuple[list[tuple[int, str]], list[DataWarning]] | None:
+    """Return pairs by rank where as many poses as pictures are counted on, each from a number of its own."""
+    numbers = [[_number(name) for name in part] for part in (names, pictures)]
+    if len(names) != len(pictures) or not all(all(part) for part in numbers):
+        return None
+    counts = [sorted(map(int, part)) for part in numbers]
+    if any(part != list(range(part[0], part[0] + len(part))) for part in counts):
+        return None
+    shift = counts[1][0] - counts[0][0]
+    places = {int(number): picture for number, picture in zip(numbers[1], pictures, strict=True)}
+    message = f"poses are counted from {counts[0][0]}, pictures from {counts[1][0]}: matched in order"
+    return [(row, places[int(number) + shift]) for row, number in enumerate(numbers[0])], [
+        DataWarning("counted_otherwise", message)
+    ]
 
 
 def _left_out(pictures: Sequence[str], rows: PoseRows, pairs: Sequence[tuple[int, str]]) -> list[DataWarning]:
