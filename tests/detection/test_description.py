@@ -151,6 +151,19 @@ def test_the_same_board_twice_is_said(board: Target) -> None:
     assert "twice" in found.evidence
 
 
+def test_the_same_board_twice_is_said_of_one_that_is_cut_and_of_chessboards() -> None:
+    image = side_by_side(CHARUCO, CHARUCO)
+    cut = image[:, : round(0.72 * image.shape[1])]
+    found = detect(cut, CHARUCO)
+    assert isinstance(found, Detection) or found.reason is Reason.REPEATED
+    board = Chessboard(6, 9, 0.025)
+    found = detect(side_by_side(board, board), board)
+    assert isinstance(found, NotFound)
+    assert found.reason is Reason.REPEATED
+    other = detect(side_by_side(board, Chessboard(5, 7, 0.025)), board)
+    assert isinstance(other, Detection)
+
+
 def test_a_board_described_as_one_of_its_own_parts_is_not_found_under_wrong_names() -> None:
     """A grid whose numbers begin in the middle of the one that is shown."""
     for first in range(1, 9):

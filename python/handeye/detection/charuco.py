@@ -134,7 +134,7 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         number = len(good)
         if number >= FEWEST_CORNERS:
             return ordered(target, numbers[good], sharp.places[good], sharp.sigmas_px[good])
-    return NotFound(
+    return seen_markers.twice(target) or NotFound(
         Reason.INCOMPLETE,
         f"{number} of {target.point_count} corners by {len(markers)} markers; {FEWEST_CORNERS} are needed",
     )

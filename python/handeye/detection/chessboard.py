@@ -50,12 +50,13 @@ def find(image: Image, target: Chessboard) -> Detection | NotFound:
     spoilt: NotFound | None = None
     core = max(FEWEST, min(target.point_count // 3, LARGE_CORE))
     for part in _parts(image):
-        for mesh in meshes(part.picture, find_saddles(part.picture), core):
-            laid = _laid(target, mesh)
-            if laid is None:
-                continue
-            found = _measured(image, target, _labeled(image, target, part.places(laid)))
+        laid = [_laid(target, mesh) for mesh in meshes(part.picture, find_saddles(part.picture), core)]
+        boards = [board for board in laid if board is not None]
+        for board in boards:
+            found = _measured(image, target, _labeled(image, target, part.places(board)))
             if isinstance(found, Detection):
+                if any(_is_elsewhere(board, other) for other in boards):
+                    return NotFound(Reason.REPEATED, "the board is in the picture twice")
                 return found
             spoilt = spoilt or found
     return spoilt or diagnose(
@@ -84,6 +85,12 @@ def _laid(target: Chessboard, mesh: Mesh) -> FloatArray | None:
     if grid.shape[:2] != (target.rows, target.columns) or not _is_certain(np.isfinite(grid[..., 0])):
         return None
     return grid.reshape(-1, 2)
+
+
+def _is_elsewhere(board: FloatArray, other: FloatArray) -> bool:
+    """Tell whether the corners (P, 2) of another board are all outside of the box around those of a board."""
+    low, high = np.nanmin(board, axis=0), np.nanmax(board, axis=0)
+    return not ((other >= low) & (other <= high)).all(axis=1).any()
 
 
 def _is_certain(there: NDArray[np.bool_]) -> bool:

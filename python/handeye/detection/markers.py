@@ -78,6 +78,15 @@ class Seen:
         once = np.isin(numbers, values[counts == 1])
         return cls(numbers[once], places[once], values[counts > 1])
 
+    def twice(self, target: Coded) -> "NotFound | None":
+        """Return word of a board that is in the picture twice, as markers of it are; None if none is."""
+        again = int(np.isin(self.repeated, target.marker_ids).sum())
+        if not again:
+            return None
+        return NotFound(
+            Reason.REPEATED, f"the board is in the picture twice: {again} of its markers are seen twice"
+        )
+
     def of_board(self, target: Coded) -> "tuple[IndexArray, FloatArray] | NotFound":
         """Return which markers (K,) of a board are there, and their corners (K, 4, 2) in the image.
 
@@ -85,11 +94,10 @@ class Seen:
         """
         of_board = target.marker_ids
         once = np.setdiff1d(self.ids, self.repeated)
-        if (again := int(np.isin(self.repeated, of_board).sum())) > np.isin(once, of_board).sum():
-            return NotFound(
-                Reason.REPEATED,
-                f"the board is in the picture twice: {again} of its markers are seen twice",
-            )
+        if np.isin(self.repeated, of_board).sum() > np.isin(once, of_board).sum() and (
+            twice := self.twice(target)
+        ):
+            return twice
         order = np.argsort(of_board)
         at = np.searchsorted(of_board, self.ids, sorter=order).clip(0, len(order) - 1)
         which = order[at]
