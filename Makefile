@@ -79,7 +79,7 @@ ARM_TARGET := aarch64-unknown-linux-gnu
 wheels: $(STAMPS)/run ## build dist/*.whl for this machine, and for 64-bit ARM where its Rust target is installed
 	$(say) 'maturin build: this machine'
 	@$(BIN)/maturin build --release --locked --out dist
-	@if [ -d "$$(rustc --print sysroot)/lib/rustlib/$(ARM_TARGET)/lib" ]; then \
+	@if [ -d "$$($${RUSTC:-rustc} --print sysroot)/lib/rustlib/$(ARM_TARGET)/lib" ]; then \
 		printf '== %s\n' 'maturin build: $(ARM_TARGET)' && \
 		$(BIN)/maturin build --release --locked --out dist --target $(ARM_TARGET); \
 	else \

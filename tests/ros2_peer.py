@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 BASE_AND_FLANGE = "base=base,flange=flange"
@@ -41,6 +42,23 @@ class Peer:
         self._process.stdin.write(f"{line}\n")
         self._process.stdin.flush()
         assert self._process.stdout.readline() == "heard\n"
+
+    def joints(self) -> np.ndarray:
+        """(n,) where its arm stands, past ROS 2."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write("where\n")
+        self._process.stdin.flush()
+        return np.array([float(word) for word in self._process.stdout.readline().split()])
+
+    def cut(self) -> None:
+        """Let nothing of it be heard; the motion that runs goes on."""
+        for stream in ("joints", "tf", "image"):
+            self.say(f"{stream} silent")
+
+    def mend(self) -> None:
+        """Let it be heard again."""
+        self.say("well")
 
     def close(self) -> None:
         """End it."""

@@ -27,6 +27,16 @@ def test_importing_it_imports_nothing_heavy() -> None:
     assert found.stdout.strip() == "[]"
 
 
+@pytest.mark.parametrize(
+    "code", ["import handeye; handeye.solve", "from handeye.cli.boundary import run; run(['--help'])"]
+)
+def test_who_drives_nothing_imports_no_driver(code: str) -> None:
+    ask = "[m for m in sys.modules if '.drivers.' in m or m.startswith(('handeye.ros', 'handeye.testing'))]"
+    whole = f"import sys\ntry:\n    {code}\nexcept SystemExit:\n    pass\nprint({ask})"
+    found = subprocess.run([sys.executable, "-c", whole], capture_output=True, text=True, check=True)
+    assert found.stdout.splitlines()[-1] == "[]"
+
+
 def test_it_runs_as_a_module() -> None:
     found = subprocess.run(
         [sys.executable, "-m", "handeye", "--version"], capture_output=True, text=True, check=True

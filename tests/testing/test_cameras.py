@@ -18,6 +18,10 @@ class Steady:
         self.scene = 0
         self.time_s = 0.0
         self.connected = True
+        self.closed = 0
+
+    def close(self) -> None:
+        self.closed += 1
 
     def grab(self, label: str) -> Frame:
         if not self.connected:
@@ -119,6 +123,18 @@ class NotMended(Steady):
         return super().grab(label)
 
 
+class ClosesOnce(Steady):
+    def close(self) -> None:
+        super().close()
+        if self.closed > 1:
+            raise ValueError("closed already")
+
+
+class ClosesPolitely(Steady):
+    def close(self) -> None:
+        self.grab("goodbye")
+
+
 BROKEN: list[tuple[type, str, str]] = [
     (NoGrab, "test_keeps_the_contract", "lacks grab"),
     (Coloured, "test_keeps_the_contract", "expected grey values"),
@@ -129,6 +145,8 @@ BROKEN: list[tuple[type, str, str]] = [
     (Queue, "test_a_picture_is_of_now", "of before"),
     (LastOne, "test_says_that_the_connection_is_lost", "DID NOT RAISE"),
     (NotMended, "test_says_that_the_connection_is_lost", "no camera"),
+    (ClosesOnce, "test_can_be_closed", "second time: .*closed already"),
+    (ClosesPolitely, "test_can_be_closed_without_a_connection", "first time: .*no camera"),
 ]
 
 

@@ -26,6 +26,10 @@ class SlowArm:
         self.joints = np.array(CELL.start_rad)
         self.connected = True
         self.halted = threading.Event()
+        self.closed = 0
+
+    def close(self) -> None:
+        self.closed += 1
 
     def move_to(self, goal: Goal) -> None:
         if goal.joints_rad is None:
@@ -215,6 +219,20 @@ class NotMended(SlowArm):
             raise
 
 
+class ClosesOnce(SlowArm):
+    def close(self) -> None:
+        super().close()
+        if self.closed > 1:
+            raise ValueError("closed already")
+
+
+class ClosesPolitely(SlowArm):
+    """It says goodbye, and cannot where nobody hears it."""
+
+    def close(self) -> None:
+        self.read_pose()
+
+
 class Raw(SlowArm):
     def read_pose(self) -> Reading:
         return super().read_pose().T_base_flange  # type: ignore[return-value]
@@ -301,6 +319,8 @@ BROKEN: list[tuple[type, str, str]] = [
     (SilentLoss, "test_says_that_the_connection_is_lost", "expected DeviceError"),
     (GoesOnBlind, "test_says_that_the_connection_is_lost", "without a connection"),
     (NotMended, "test_says_that_the_connection_is_lost", "once the connection is back"),
+    (ClosesOnce, "test_can_be_closed", "second time: .*closed already"),
+    (ClosesPolitely, "test_can_be_closed_without_a_connection", "first time: .*no connection"),
 ]
 
 

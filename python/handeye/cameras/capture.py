@@ -30,15 +30,9 @@ class Capture:
     """
 
     def __init__(self, source: int | str, *, size_px: tuple[int, int] | None = None) -> None:
-        self._source = source
-        self._capture = cv2.VideoCapture(source)
-        if not self._capture.isOpened():
-            raise DeviceError(
-                f"camera {source}: cannot be opened", code=Code.NO_CAMERA, hint="is another program using it?"
-            )
-        if size_px is not None:
-            self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, size_px[0])
-            self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size_px[1])
+        self._source, self._size_px = source, size_px
+        self._capture: cv2.VideoCapture | None = None
+        self._open()
 
     def grab(self, label: str) -> Frame:
         """Return a picture of now.
@@ -46,12 +40,14 @@ class Capture:
         Raises
         ------
         DeviceError
-            The camera gives none.
+            The camera gives none; one that was lost is opened again at the next call.
         """
+        capture = self._open()
         for _ in range(STALE_FRAMES):
-            self._capture.grab()
-        good, picture = self._capture.read()
+            capture.grab()
+        good, picture = capture.read()
         if not good:
+            self.close()
             raise DeviceError(f"camera {self._source}: no picture for {label}", code=Code.NO_IMAGE)
         grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
         if grey.dtype != np.uint8:
@@ -59,3 +55,24 @@ class Capture:
                 f"camera {self._source}: pixels of {grey.dtype}, expected 8 bits", code=Code.BAD_IMAGE
             )
         return Frame(np.ascontiguousarray(grey, dtype=np.uint8), timestamp_s=time.time())
+
+    def close(self) -> None:
+        """Let go of the camera."""
+        if self._capture is not None:
+            self._capture.release()
+            self._capture = None
+
+    def _open(self) -> cv2.VideoCapture:
+        if self._capture is None:
+            capture = cv2.VideoCapture(self._source)
+            if not capture.isOpened():
+                raise DeviceError(
+                    f"camera {self._source}: cannot be opened",
+                    code=Code.NO_CAMERA,
+                    hint="is another program using it?",
+                )
+            if self._size_px is not None:
+                capture.set(cv2.CAP_PROP_FRAME_WIDTH, self._size_px[0])
+                capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._size_px[1])
+            self._capture = capture
+        return self._capture

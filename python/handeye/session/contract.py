@@ -165,6 +165,18 @@ def stop_in_motion(robot: Robot, goals: Sequence[Goal]) -> list[str]:
     return wrong + arrival(robot, goals[1])
 
 
+def closed_twice(driver: object) -> list[str]:
+    """Close a driver twice, where it has `close`: the end of a session must not depend on its connection."""
+    close: Callable[[], None] | None = getattr(driver, "close", None)
+    for time_of in ("first", "second"):
+        try:
+            if close is not None:
+                Calls("driver").run(SECONDS, close)
+        except DeviceError as error:
+            return [f"close, the {time_of} time: {error.message}"]
+    return []
+
+
 def interrupted(
     robot: Robot, goal: Goal, interrupt: Callable[[], None]
 ) -> tuple[float, BaseException | None]:

@@ -8,7 +8,7 @@ import pytest
 from handeye.cameras.protocol import ImageSource, checked_frame
 from handeye.errors import DeviceError
 from handeye.session.calls import Calls
-from handeye.session.contract import SECONDS, check_camera
+from handeye.session.contract import SECONDS, check_camera, closed_twice
 
 Cable = tuple[Callable[[], None], Callable[[], None]]
 
@@ -76,3 +76,18 @@ class CameraTests:
             calls.run(SECONDS, camera.grab, "view_02.1")
         mend()
         checked_frame(calls.run(SECONDS, camera.grab, "view_02.2"))
+
+    def test_can_be_closed(self, camera: ImageSource) -> None:
+        """Twice, where it has `close`."""
+        assert closed_twice(camera) == []
+
+    def test_can_be_closed_without_a_connection(self, camera: ImageSource, cable: Cable | None) -> None:
+        """A session that ends by a lost connection closes its driver too."""
+        if cable is None:
+            pytest.skip("there is no cable to pull")
+        cut, mend = cable
+        cut()
+        try:
+            assert closed_twice(camera) == []
+        finally:
+            mend()

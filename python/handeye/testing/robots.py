@@ -13,6 +13,7 @@ from handeye.session.contract import (
     REST_RAD,
     SECONDS,
     arrival,
+    closed_twice,
     interrupted,
     read,
     refusal,
@@ -39,7 +40,8 @@ class RobotTests:
     cable
         Two functions: one that cuts the connection at once, one that mends it; None where there is none.
 
-    `takes_time` is False for arms that stand at their goal at once.
+    `takes_time` is False for arms that stand at their goal at once, `stops_by_itself` for those whose
+    controller goes on where it hears nothing: say so on the driver's page.
 
     Examples
     --------
@@ -50,6 +52,7 @@ class RobotTests:
     """
 
     takes_time = True
+    stops_by_itself = True
 
     @pytest.fixture
     def unreachable(self) -> Goal | None:
@@ -106,7 +109,7 @@ class RobotTests:
     def test_says_that_the_connection_is_lost(
         self, robot: Robot, goals: Sequence[Goal], cable: Cable | None
     ) -> None:
-        """In mid-motion: an error, the arm does not go on to its goal, and once mended it works again."""
+        """In mid-motion: an error; once mended it works again. It does not go on, if it `stops_by_itself`."""
         if cable is None:
             pytest.skip("there is no cable to pull")
         assert arrival(robot, goals[0]) == []
@@ -116,15 +119,32 @@ class RobotTests:
         _, error = interrupted(robot, slow, cut)
         assert isinstance(error, DeviceError), f"{error!r}, expected DeviceError"
         mend()
+        if not self.stops_by_itself:
+            assert stop_at_rest(robot) == []
         first, second = read(robot), read(robot)
         assert first is not None, "the pose cannot be read once the connection is back"
         assert second is not None, "the pose cannot be read once the connection is back"
         assert is_near(first.T_base_flange, second.T_base_flange, REST_M, REST_RAD), (
             "the arm moves on without a connection"
         )
-        short = arrival(_Still(robot), slow)
-        assert short, "the arm went on to its goal without a connection"
+        if self.stops_by_itself:
+            assert arrival(_Still(robot), slow), "the arm went on to its goal without a connection"
         assert arrival(robot, goals[1]) == []
+
+    def test_can_be_closed(self, robot: Robot) -> None:
+        """Twice, where it has `close`."""
+        assert closed_twice(robot) == []
+
+    def test_can_be_closed_without_a_connection(self, robot: Robot, cable: Cable | None) -> None:
+        """A session that ends by a lost connection closes its driver too."""
+        if cable is None:
+            pytest.skip("there is no cable to pull")
+        cut, mend = cable
+        cut()
+        try:
+            assert closed_twice(robot) == []
+        finally:
+            mend()
 
 
 class _Still:

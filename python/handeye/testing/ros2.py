@@ -2,7 +2,8 @@
 
 `python -m handeye.testing.ros2 --seed 3` publishes until its input ends. Lines of its input say what goes
 wrong from now on: `image late`, `image ahead`, `image unstamped`, `image backwards`, `image silent`, `image
-mismatched` (camera_info of another time), the same with `joints` or `tf`; `refuse`; `well`.
+mismatched` (camera_info of another time), the same with `joints` or `tf`; `refuse`; `well`. It answers
+`heard`, to `where` the joints.
 
 Pictures are stamped when they are exposed and sent a moment later, all the time: a program that takes
 the latest gets one from before the arm came to rest. On the move they show nothing. Joint states name the
@@ -103,6 +104,11 @@ class MockRos2:
         )
         node.create_timer(1.0 / STATE_HZ, self._tell)
         node.create_timer(1.0 / PICTURE_HZ, self._look)
+
+    @property
+    def joints_rad(self) -> list[float]:
+        """(n,) where the arm stands."""
+        return self._q.tolist()
 
     def close(self) -> None:
         """Leave ROS 2."""
@@ -253,6 +259,10 @@ def main() -> None:
             mock.refuses = False
         elif stream == "refuse":
             mock.refuses = True
+        elif stream == "where":
+            sys.stdout.write(" ".join(map(repr, mock.joints_rad)) + "\n")
+            sys.stdout.flush()
+            continue
         elif fault in FAULTS:
             mock.faults[stream] = fault
         sys.stdout.write("heard\n")

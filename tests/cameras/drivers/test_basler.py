@@ -50,7 +50,7 @@ def emulated(tmp_path: Path) -> Emulated:
 def camera(emulated: Emulated) -> Iterator[BaslerCamera]:
     made = BaslerCamera(f"{ONE},{emulated.settings}")
     yield made
-    made._close()
+    made.close()
 
 
 class TestContract(CameraTests):
@@ -88,7 +88,7 @@ def test_two_cameras_at_one_stop(camera: ImageSource) -> None:
     rig = SeveralCameras({"left": camera, "right": other})
     shapes = {name: eye.grab("station_01.1").image.shape for name, eye in rig.eyes().items()}  # type: ignore[union-attr]
     rig.close()
-    other._close()
+    other.close()
     assert shapes["left"] == (240, 320)
     assert shapes["right"] != (240, 320)
 

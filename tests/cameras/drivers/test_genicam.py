@@ -1,6 +1,6 @@
 """The driver of GenICam keeps the contract against the producer that ships with the library genicam."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +11,7 @@ from handeye.cameras.drivers import genicam
 from handeye.cameras.drivers.genicam import GenicamCamera
 from handeye.errors import DeviceError
 from handeye.testing import CameraTests
+from partners import genicam_cable
 
 
 @pytest.fixture
@@ -31,6 +32,10 @@ class TestContract(CameraTests):
     @pytest.fixture
     def size_px(self) -> tuple[int, int]:
         return (400, 400)
+
+    @pytest.fixture
+    def cable(self, camera: GenicamCamera) -> tuple[Callable[[], None], Callable[[], None]]:
+        return genicam_cable(camera)
 
 
 def test_two_cameras_at_one_stop(producer: Path) -> None:

@@ -1,6 +1,6 @@
 """The driver of Franka keeps the contract against franky-sim, which speaks libfranka's own protocol."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -14,37 +14,34 @@ from handeye.robots.drivers.franka import FrankaRobot
 from handeye.robots.protocol import Goal, Robot
 from handeye.testing import RobotTests
 from handeye.types import Pose
+from partners import FciCable, simulated_franka
 
 TURN = np.array([0.2, 0.1, 0.0, -0.1, 0.2, 0.0, -0.2])
 HOME = np.array([0.0, -0.3, 0.0, -1.9, 0.0, 1.7, 0.7])
 
 
 @pytest.fixture(scope="module")
-def simulated() -> Iterator[Path]:
-    pytest.importorskip("franky", reason="franky-control is not installed (extra franka)")
-    sim = pytest.importorskip("franky_sim", reason="franky-sim is not installed")
-    from franky_sim.mujoco_simulator import MujocoSimulator
-
-    with MujocoSimulator(enable_visualization=False) as simulator:
-        simulator.add_robot()
-        with sim.SimulationServer(simulator) as server:
-            server.run_async()
-            yield Path(sim.__file__).parent / "assets" / "fr3.urdf"
-
-
-@pytest.fixture(scope="module")
-def driver(simulated: Path) -> FrankaRobot:
-    return FrankaRobot("127.0.0.1,no-realtime")
+def simulated() -> Iterator[tuple[str, FciCable]]:
+    with simulated_franka() as (address, _, cable):
+        yield address, cable
 
 
 class TestContract(RobotTests):
     @pytest.fixture
-    def robot(self, driver: FrankaRobot) -> Robot:
-        return driver
+    def robot(self, simulated: tuple[str, FciCable]) -> Iterator[Robot]:
+        made = FrankaRobot(simulated[0])
+        yield made
+        made.close()
 
     @pytest.fixture
-    def arm(self, simulated: Path) -> Arm:
-        return read_urdf(simulated, tip="fr3_link8")
+    def cable(self, simulated: tuple[str, FciCable]) -> tuple[Callable[[], None], Callable[[], None]]:
+        return simulated[1].cut, simulated[1].mend
+
+    @pytest.fixture
+    def arm(self, simulated: tuple[str, FciCable]) -> Arm:
+        import franky_sim
+
+        return read_urdf(Path(franky_sim.__file__).parent / "assets" / "fr3.urdf", tip="fr3_link8")
 
     @pytest.fixture
     def goals(self, arm: Arm) -> Sequence[Goal]:

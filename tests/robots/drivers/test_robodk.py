@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import pytest
 
@@ -32,6 +32,12 @@ def robot(station: MockRoboDK) -> RoboDKRobot:
 
 
 class TestContract(RobotTests):
+    stops_by_itself = False
+
+    @pytest.fixture
+    def cable(self, station: MockRoboDK) -> tuple[Callable[[], None], Callable[[], None]]:
+        return station.cut, station.mend
+
     @pytest.fixture(autouse=True)
     def _quick(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(contract, "INTERRUPTED_S", 1.5)

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -75,13 +75,21 @@ def driver(peer: Peer) -> Iterator[Ros2Robot]:
 
 
 class TestContract(RobotTests):
+    stops_by_itself = False
+
     @pytest.fixture(autouse=True)
     def _quick(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(contract, "INTERRUPTED_S", 1.5)
 
     @pytest.fixture
-    def robot(self, driver: Ros2Robot) -> Ros2Robot:
-        return driver
+    def robot(self, peer: Peer) -> Iterator[Ros2Robot]:
+        made = Ros2Robot(BASE_AND_FLANGE)
+        yield made
+        made.close()
+
+    @pytest.fixture
+    def cable(self, peer: Peer) -> tuple[Callable[[], None], Callable[[], None]]:
+        return peer.cut, peer.mend
 
     @pytest.fixture
     def goals(self) -> Sequence[Goal]:

@@ -2,7 +2,7 @@
 
 import socket
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -34,9 +34,16 @@ def robot(box: MockXArm) -> Iterator[XArmRobot]:
 
 
 class TestContract(RobotTests):
+    stops_by_itself = False
+
     @pytest.fixture(autouse=True)
     def _quick(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(contract, "INTERRUPTED_S", 1.5)
+        monkeypatch.setattr(xarm, "ANSWER_S", 0.5)
+
+    @pytest.fixture
+    def cable(self, box: MockXArm) -> tuple[Callable[[], None], Callable[[], None]]:
+        return box.cut, box.mend
 
     @pytest.fixture
     def goals(self) -> Sequence[Goal]:

@@ -64,7 +64,7 @@ class BaslerCamera:
         with self._one_at_a_time:
             try:
                 if self._camera is None or self._camera.IsCameraDeviceRemoved():
-                    self._close()
+                    self._forget()
                     self._camera = self._opened()
                 # Begins to acquire, takes one picture, ends: nothing waits in a queue.
                 result = self._camera.GrabOne(GRAB_MS)
@@ -78,7 +78,7 @@ class BaslerCamera:
                 finally:
                     result.Release()
             except self._errors as error:
-                self._close()
+                self._forget()
                 raise DeviceError(
                     f"{label}: camera {self._serial or '(the only one)'}: {str(error).strip()}",
                     code=Code.NO_IMAGE,
@@ -86,7 +86,12 @@ class BaslerCamera:
                 ) from error
         return Frame(pixels, timestamp_s=stamp / 1e9 if stamp else None)
 
-    def _close(self) -> None:
+    def close(self) -> None:
+        """Let go of the camera."""
+        with self._one_at_a_time:
+            self._forget()
+
+    def _forget(self) -> None:
         if self._camera is not None:
             with suppress(self._errors):  # it may be gone already
                 self._camera.Close()

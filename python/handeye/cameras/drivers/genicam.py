@@ -2,6 +2,7 @@
 
 import os
 import threading
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ class GenicamCamera:
             except DeviceError:
                 raise
             except Exception as error:
-                self.close()
+                self._forget()
                 raise DeviceError(
                     f"{label}: camera {self._name or '(the only one)'}: {type(error).__name__}: {error}",
                     code=Code.NO_IMAGE,
@@ -98,9 +99,14 @@ class GenicamCamera:
 
     def close(self) -> None:
         """Let go of the camera."""
-        if self._source is not None:
-            self._source.destroy()
-            self._source = None
+        with self._one_at_a_time:
+            self._forget()
+
+    def _forget(self) -> None:
+        source, self._source = self._source, None
+        if source is not None:
+            with suppress(Exception):  # it may be gone already; producers raise what they like
+                source.destroy()
 
     def _open(self) -> None:
         harvester = _harvester(self._producers)

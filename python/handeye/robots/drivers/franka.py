@@ -49,7 +49,7 @@ class FrankaRobot:
         self._realtime = realtime.Ignore if option else realtime.Enforce
         self._link: Any = None
         self._lock = threading.Lock()
-        self._connected()
+        _ = self._arm
 
     @staticmethod
     def found() -> list[tuple[str, str]]:
@@ -74,24 +74,25 @@ class FrankaRobot:
         if goal.joints_rad is None or len(goal.joints_rad) != JOINTS:
             raise DeviceError(f"{goal.label}: seven joint positions are needed", code=Code.MOTION_REFUSED)
         self._check_limits(goal.label, goal.joints_rad)
-        arm = self._connected()
         franky = self._franky
         try:
-            if arm.has_errors and not arm.recover_from_errors():
+            if self._arm.has_errors and not self._arm.recover_from_errors():
                 raise DeviceError("the arm reports an error that cannot be undone", code=Code.NOT_READY)
-            limits = np.asarray(arm.joint_velocity_limit.max)
-            arm.joint_velocity_limit.set([min(float(goal.speed_rad_s), float(limit)) for limit in limits])
+            limits = np.asarray(self._arm.joint_velocity_limit.max)
+            self._arm.joint_velocity_limit.set(
+                [min(float(goal.speed_rad_s), float(limit)) for limit in limits]
+            )
             share = franky.RelativeDynamicsFactor(1.0, ACCELERATION_SHARE, JERK_SHARE)
             target = franky.JointState(np.array(goal.joints_rad, dtype=np.float64))
-            arm.move(franky.JointMotion(target, relative_dynamics_factor=share), asynchronous=True)
+            self._arm.move(franky.JointMotion(target, relative_dynamics_factor=share), asynchronous=True)
             # `poll_motion` of franky 2.0 says the opposite of its documentation, and is not asked.
-            while arm.is_in_control:
+            while self._arm.is_in_control:
                 time.sleep(POLL_S)
-            arm.join_motion(STOPPED_S)  # raises what ended it
+            self._arm.join_motion(STOPPED_S)  # raises what ended it
         except franky.Exception as error:
             raise self._described(goal.label, error) from error
-        self._settled(arm)
-        off = float(np.abs(np.asarray(arm.state.q) - goal.joints_rad).max())
+        self._settled()
+        off = float(np.abs(np.asarray(self._arm.state.q) - goal.joints_rad).max())
         if off > 0.02:
             raise DeviceError(
                 f"{goal.label}: stopped {np.rad2deg(off):.1f} deg short of it", code=Code.STOPPED
@@ -105,9 +106,8 @@ class FrankaRobot:
         DeviceError
             `connection_lost`.
         """
-        arm = self._connected()
         try:
-            state = arm.state
+            state = self._arm.state
         except self._franky.Exception as error:
             raise self._described("reading", error) from error
         T_base_effector = Pose(np.asarray(state.O_T_EE.matrix))
@@ -124,15 +124,19 @@ class FrankaRobot:
         DeviceError
             The arm cannot be told, or still moves.
         """
-        arm = self._connected()
         try:
             # Without a motion there is nothing to stop, and the next one would be taken for stopped.
-            if arm.is_in_control:
-                arm.stop()
-                self._ended(arm)
+            if self._arm.is_in_control:
+                self._arm.stop()
+                self._ended()
         except self._franky.Exception as error:
             raise self._described("stop", error) from error
-        self._settled(arm)
+        self._settled()
+
+    def close(self) -> None:
+        """Let go of the arm."""
+        with self._lock:
+            self._link = None
 
     def _check_limits(self, label: str, joints_rad: Sequence[float]) -> None:
         for number, (value, (low, high)) in enumerate(zip(joints_rad, LIMITS_RAD, strict=True), 1):
@@ -142,21 +146,21 @@ class FrankaRobot:
                     code=Code.MOTION_REFUSED,
                 )
 
-    def _ended(self, arm: Any) -> None:  # noqa: ANN401 - a robot of franky
+    def _ended(self) -> None:
         """Wait for the word that the motion was stopped, which would else be taken for that of the next."""
         end = time.monotonic() + SETTLE_S
-        while arm.is_in_control and time.monotonic() < end:
+        while self._arm.is_in_control and time.monotonic() < end:
             with suppress(self._franky.ControlException, self._franky.CommandException):
-                arm.join_motion(STOPPED_S)
+                self._arm.join_motion(STOPPED_S)
             time.sleep(STOPPED_S)
 
-    def _settled(self, arm: Any) -> None:  # noqa: ANN401 - a robot of franky
+    def _settled(self) -> None:
         """Wait until the arm rests: the motion of the controller ends before that of the arm."""
         end = time.monotonic() + SETTLE_S
         since_s, reference = 0.0, np.full(JOINTS, np.inf)
         while time.monotonic() < end:
             try:
-                state = arm.state
+                state = self._arm.state
                 # By the clock of the controller: an old state that comes again is no rest.
                 joints, now_s = np.asarray(state.q), state.time.to_sec()
             except self._franky.Exception as error:
@@ -168,7 +172,9 @@ class FrankaRobot:
             time.sleep(POLL_S)
         raise DeviceError("the arm does not come to rest", code=Code.NOT_AT_REST)
 
-    def _connected(self) -> Any:  # noqa: ANN401 - a robot of franky
+    @property
+    def _arm(self) -> Any:  # noqa: ANN401 - a robot of franky
+        """The arm, connected. Kept nowhere else: an error that holds it would hold the only connection."""
         with self._lock:
             if self._link is None:
                 try:

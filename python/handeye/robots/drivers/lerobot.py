@@ -154,6 +154,10 @@ class LeRobotArm:
             self._send(self._joints(), np.full(len(self._servos), STOP_RAD_S))
             self._settled()
 
+    def close(self) -> None:
+        """Let go of the port; the servos go on holding the arm."""
+        self._bus.close()
+
     def _checked(self, goal: Goal) -> FloatArray:
         if goal.joints_rad is None or len(goal.joints_rad) != len(self._servos):
             raise DeviceError(
