@@ -53,10 +53,10 @@ class Partner:
     followed: bool = False
     peer: Peer | None = None
 
-    def moves(self) -> bool:
+    def moves(self, seconds: float = LOOK_S) -> bool:
         """Whether the arm turns just now."""
         before = self.joints().copy()
-        time.sleep(LOOK_S)
+        time.sleep(seconds)
         return float(np.abs(self.joints() - before).max()) > TURNS_RAD
 
     def show(self) -> None:
@@ -159,6 +159,8 @@ def simulated_franka() -> Iterator[tuple[str, Callable[[], np.ndarray], FciCable
                 server.run_async()
                 cable = FciCable(server.robot_servers[0])
                 yield f"{model.hostname},no-realtime", (lambda: np.array(model.inner_state.q)), cable
+            for one in server.robot_servers:
+                one.reset_state()  # it forgets to close its connection
     finally:
         BaseRobot.kinematics = shared
 

@@ -1,8 +1,10 @@
 """The drivers of this package keep the contract, and the contract finds those that do not."""
 
 from collections.abc import Iterator
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from threading import Timer
+from types import ModuleType
 
 import cv2
 import numpy as np
@@ -13,6 +15,7 @@ from handeye.cameras.protocol import Frame
 from handeye.cameras.replay import ReplayCamera
 from handeye.datasets.images import read_image
 from handeye.errors import DeviceError, InputError
+from handeye.extension import CAMERAS, ROBOTS, announced
 from handeye.notations import MAKERS, Notation, pose_text
 from handeye.robots import open_arm
 from handeye.robots.manual import ManualRobot
@@ -33,6 +36,31 @@ NOBODY = Person(lambda _: "skip", lambda _: None)
 def goals() -> list[Goal]:
     postures = [np.array(HOME) + offset for offset in (0.0, 0.05, -0.1)]
     return [Goal(f"view_{i:02d}.1", Pose(ARM.forward(q)), tuple(q)) for i, q in enumerate(postures, 1)]
+
+
+# They speak their protocols themselves.
+WITHOUT_LIBRARY = {"ur", "xarm"}
+POINTS = [
+    point
+    for group in (ROBOTS, CAMERAS)
+    for point in announced(group).values()
+    if point.value.startswith("handeye.") and point.name not in WITHOUT_LIBRARY
+]
+
+
+@pytest.mark.parametrize("point", POINTS, ids=[f"{point.group}.{point.name}" for point in POINTS])
+def test_a_driver_without_its_library_says_what_it_would_need(
+    point: EntryPoint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def absent(name: str) -> ModuleType:
+        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    driver = point.load()
+    monkeypatch.setattr("handeye.extension.import_module", absent)
+    with pytest.raises(DeviceError) as caught:
+        driver.found()
+    assert caught.value.code == "library_missing"
+    assert caught.value.hint == f"pip install 'handeye[{point.name}]'" or "source ROS 2" in caught.value.hint
 
 
 def test_the_simulated_arm_keeps_the_contract() -> None:

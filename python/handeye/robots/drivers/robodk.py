@@ -52,6 +52,18 @@ class RoboDKRobot:
         self._stopped = threading.Event()
         self._robot()
 
+    @staticmethod
+    def found() -> list[tuple[str, str]]:
+        """Return nothing: robots are reached by the address of RoboDK.
+
+        Raises
+        ------
+        DeviceError
+            The library is not there.
+        """
+        library("robodk.robolink", "robodk")
+        return []
+
     def move_to(self, goal: Goal) -> None:
         """Turn the joints to those of the goal.
 
