@@ -6,7 +6,7 @@ cargo build --release --example counted
 cargo build --release --example counted --target aarch64-unknown-linux-gnu
 python tools/compare_gains.py target/release/examples/counted \
     target/aarch64-unknown-linux-gnu/release/examples/counted \
-    --runner "qemu-aarch64-static -L /usr/aarch64-linux-gnu"
+    --runner "qemu-aarch64 -L /"
 """
 
 import argparse
