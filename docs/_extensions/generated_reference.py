@@ -116,6 +116,7 @@ def core_page(stub: Path) -> str:
     """Return the page of the compiled core, from its stub."""
     tree = ast.parse(stub.read_text())
     lines = ["# The core", "", "`handeye._core` is compiled from Rust. It knows no files and no clock.", ""]
+    lines += [EXAMPLES, ""]
     for node in tree.body:
         if not isinstance(node, ast.FunctionDef | ast.ClassDef) or node.name.startswith("_"):
             continue

@@ -15,26 +15,52 @@ from numpy.typing import ArrayLike, NDArray
 # Calls
 
 def panic(message: str) -> None:
-    """Fail as a mistake in the core would: a `RuntimeError` with the message."""
+    """Fail as a mistake in the core would: a `RuntimeError` with the message.
+
+    >>> _core.panic("a view of nothing")
+    Traceback (most recent call last):
+        ...
+    RuntimeError: ...a view of nothing...
+    """
 
 # Rigid transforms
 
 def se3_exp(xi: ArrayLike) -> NDArray[float64]:
-    """Transforms (N, 4, 4) of twists (N, 6), `[rho; phi]`: translation first."""
+    """Transforms (N, 4, 4) of twists (N, 6), `[rho; phi]`: translation first.
+
+    >>> _core.se3_exp([[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]])[0, :3, 3].tolist()
+    [0.1, 0.0, 0.0]
+    """
 
 def se3_log(T: ArrayLike) -> NDArray[float64]:
-    """Twists (N, 6) of transforms (N, 4, 4); rotation angles lie in [0, pi]."""
+    """Twists (N, 6) of transforms (N, 4, 4); rotation angles lie in [0, pi].
+
+    >>> _core.se3_log([np.eye(4)]).tolist()
+    [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    """
 
 def se3_adjoint(T: ArrayLike) -> NDArray[float64]:
-    """Adjoints (N, 6, 6) of transforms (N, 4, 4): `exp(Ad(T) xi) = T exp(xi) T^-1`."""
+    """Adjoints (N, 6, 6) of transforms (N, 4, 4): `exp(Ad(T) xi) = T exp(xi) T^-1`.
+
+    >>> np.allclose(_core.se3_adjoint([np.eye(4)])[0], np.eye(6))
+    True
+    """
 
 def nearest_rigid(T: ArrayLike) -> NDArray[float64]:
-    """The rigid transform (4, 4) nearest to a matrix (4, 4) that is off by rounding, at most 1e-4."""
+    """The rigid transform (4, 4) nearest to a matrix (4, 4) that is off by rounding, at most 1e-4.
+
+    >>> np.allclose(_core.nearest_rigid(np.diag([1.00001, 1.0, 1.0, 1.0])), np.eye(4))
+    True
+    """
 
 # Cameras
 
 def lenses() -> list[tuple[str, list[str]]]:
-    """Every lens, and the names of its coefficients after `fx, fy, cx, cy`."""
+    """Every lens, and the names of its coefficients after `fx, fy, cx, cy`.
+
+    >>> dict(_core.lenses())["brown_conrady_5"]
+    ['k1', 'k2', 'p1', 'p2', 'k3']
+    """
 
 def project(
     lens: str, parameters: ArrayLike, points_camera: ArrayLike
@@ -42,15 +68,29 @@ def project(
     """Pixels (N, 2) of points (N, 3) in the camera frame, and which (N,) the lens sees; the others are NaN.
 
     Not seen are points behind the camera and points where the distortion has folded over.
+
+    >>> pixels, seen = _core.project("pinhole", [1400, 1400, 640, 512], [[0.1, 0.0, 1.0]])
+    >>> pixels.tolist(), seen.tolist()
+    ([[780.0, 512.0]], [True])
     """
 
 def project_jacobians(
     lens: str, parameters: ArrayLike, points_camera: ArrayLike
 ) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[bool_]]:
-    """Pixels (N, 2), derivatives in points (N, 2, 3) and the n parameters (N, 2, n), and which are seen."""
+    """Pixels (N, 2), derivatives in points (N, 2, 3) and the n parameters (N, 2, n), and which are seen.
+
+    >>> found = _core.project_jacobians("pinhole", [1400, 1400, 640, 512], [[0.0, 0.0, 2.0]])
+    >>> found[1][0].tolist()  # px per metre
+    [[700.0, 0.0, ...0.0], [0.0, 700.0, ...0.0]]
+    """
 
 def unproject(lens: str, parameters: ArrayLike, uv: ArrayLike) -> tuple[NDArray[float64], NDArray[bool_]]:
-    """Unit rays (N, 3), camera frame, of pixels (N, 2), and which (N,) there are; the others are NaN."""
+    """Unit rays (N, 3), camera frame, of pixels (N, 2), and which (N,) there are; the others are NaN.
+
+    >>> rays, there = _core.unproject("pinhole", [1400, 1400, 640, 512], [[640.0, 512.0]])
+    >>> rays.tolist()
+    [[0.0, 0.0, 1.0]]
+    """
 
 def project_features(
     lens: str, parameters: ArrayLike, T_camera_target: ArrayLike, points: ArrayLike, radii: ArrayLike
@@ -60,6 +100,12 @@ def project_features(
     A feature is a point (N, 3) of the target's frame with a radius (N,): 0 for a corner, which is seen where
     it projects to; otherwise a circle whose normal is the target's z axis, seen at the area centroid of its
     image.
+
+    >>> lens = camera.lens, camera.parameters
+    >>> T_camera_target = measurements.camera_poses[0]
+    >>> pixels, seen = _core.project_features(*lens, T_camera_target, board.points, board.radii_m)
+    >>> pixels.shape == (len(board.points), 2)
+    True
     """
 
 def refine_pose(
@@ -76,6 +122,12 @@ def refine_pose(
     information (6, 6) of the left perturbation `[rho; phi]` at a noise of 1 px. Raises `InputError` for fewer
     than three features or a pixel that is not finite, `DegenerateError` if the features do not determine the
     pose, and `SolveError` if one is not in view of the starting pose or the iteration does not converge.
+
+    >>> view, known = recording.views[0], board.points[recording.views[0].point_ids]
+    >>> lens, start = (camera.lens, camera.parameters), measurements.camera_poses[0]
+    >>> pose, rmse_px, _ = _core.refine_pose(*lens, known, np.zeros(len(known)), view.pixels, start)
+    >>> rmse_px < 1
+    True
     """
 
 # The pose of one view
@@ -89,6 +141,13 @@ def planar_pose(
 
     Each is `T_camera_target` (4, 4), its error in px (root mean square over the points of the residual)
     and its information (6, 6) at a pixel noise of 1 px.
+
+    >>> view, known = recording.views[0], board.points[recording.views[0].point_ids]
+    >>> best, mirrored = _core.planar_pose(
+    ...     camera.lens, camera.parameters, known, np.zeros(len(known)), view.pixels
+    ... )
+    >>> best[1] < 1  # px
+    True
     """
 
 # Measuring in pictures
@@ -113,6 +172,12 @@ def fit_corners(
     and `bands` (N,) the distances from the edges, in pixels, beyond which there is something else. At a
     crossing diagonal parts are equal and the light may change; else the four parts may be of any grey. A
     `rough` fit ends near the place, as is enough where it tells another fit where to begin.
+
+    >>> image = np.full((40, 40), 200, np.uint8)
+    >>> image[:20, :20] = image[20:, 20:] = 50  # a crossing between pixels 19 and 20
+    >>> guess = [[19.0, 20.0]], [[[1.0, 0.0], [0.0, 1.0]]], [[0.0, 0.0]], [8.0], [4.0]
+    >>> np.round(_core.fit_corners(image, *guess, is_crossing=True, rough=False)[0], 2).tolist()
+    [[19.5, 19.5]]
     """
 
 def crossing_neighbours(places: ArrayLike, angles: ArrayLike, off: float) -> NDArray[int64]:
@@ -120,6 +185,9 @@ def crossing_neighbours(places: ArrayLike, angles: ArrayLike, off: float) -> NDA
 
     `places` (N, 2); `angles` (N, 2) of the edges from u towards v, dark between the first and the second.
     Rays are counted from u towards v from the first edge on; directions may be `off` by an angle in radians.
+
+    >>> _core.crossing_neighbours([[10.0, 10.0]], [[0.0, 1.5]], 0.3).tolist()
+    [[-1, -1, -1, -1]]
     """
 
 def area_centroids(
@@ -129,13 +197,27 @@ def area_centroids(
 
     `image` (H, W) is contiguous; `centres` (N, 2) and `shapes` (N, 2, 2) are guesses, `x' S^-1 x = 1` for x
     from the centre to the edge; `gaps` (N,) are the free distances to the next spot in pixels.
+
+    >>> image = np.full((40, 40), 200, np.uint8)
+    >>> image[15:26, 15:26] = 50  # a square spot
+    >>> _core.area_centroids(image, [[21.0, 20.0]], [30.0 * np.eye(2)], [10.0])[0].round(1).tolist()
+    [[20.0, 20.0]]
     """
 
 def free_gaps(centres: ArrayLike, shapes: ArrayLike) -> NDArray[float64]:
-    """Narrowest free distances (N,) in pixels from the edge of each spot to that of another, at least 1."""
+    """Narrowest free distances (N,) in pixels from the edge of each spot to that of another, at least 1.
+
+    >>> _core.free_gaps([[0.0, 0.0], [20.0, 0.0]], [4.0 * np.eye(2), 4.0 * np.eye(2)]).tolist()
+    [16.0, 16.0]
+    """
 
 class PlaneMap:
-    """A map from the plane of a target, in metres, to pixels: a homography, and what a lens adds to it."""
+    """A map from the plane of a target, in metres, to pixels: a homography, and what a lens adds to it.
+
+    >>> corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]])
+    >>> _core.PlaneMap.fitted(corners, 1000 * corners + 50).pixels([[0.05, 0.05]]).round(6).tolist()
+    [[100.0, 100.0]]
+    """
 
     @staticmethod
     def fitted(plane: ArrayLike, pixels: ArrayLike) -> PlaneMap | None:
@@ -148,7 +230,12 @@ class PlaneMap:
         """Pixels (N, 2, 2) per metre along each axis at places (N, 2), from both sides at `half` metres."""
 
 class Printed:
-    """The printed picture of a board, and what aligning an image with it needs."""
+    """The printed picture of a board, and what aligning an image with it needs.
+
+    >>> paper = np.ones((20, 20), np.float32)
+    >>> _core.Printed(paper, (0.0, 0.0), 100.0, 0.05, 5).drawn([[0.1, 0.1]]).tolist()
+    [1.0]
+    """
 
     def __init__(
         self,
@@ -182,7 +269,17 @@ class Printed:
         """What the picture has (N,) at places (N, 2) of the plane."""
 
 class Alignment:
-    """Where a board lies in an image."""
+    """Where a board lies in an image.
+
+    >>> paper = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((20, 20))).astype(np.float32)
+    >>> printed = _core.Printed(paper, (0.0, 0.0), 1000.0, 0.02, 41)
+    >>> plane = np.array([[0.02, 0.02], [0.06, 0.02], [0.06, 0.06], [0.02, 0.06], [0.04, 0.04]])
+    >>> image = np.full((120, 120), 200, np.uint8)
+    >>> image[20:100, 20:100] = 40 + 160 * paper
+    >>> found = printed.align(image, plane, 1000 * plane + 19.5, 5.0, False)
+    >>> bool(found.likeness(plane).min() > 0.9)
+    True
+    """
 
     def places(self, plane: ArrayLike) -> NDArray[float64]:
         """Where places (N, 2) of the plane are in the image."""
@@ -205,10 +302,18 @@ def closed_form(method: str, A: ArrayLike, C: ArrayLike) -> tuple[NDArray[float6
     A = T_base_flange, Y = T_flange_target; C = T_camera_target. Raises InputError for an unknown method,
     lists of different length or too few views, DegenerateError where the views do not rotate about two axes
     and SolveError where the method fails although an answer exists.
+
+    >>> X, Y = _core.closed_form("park_martin", measurements.motions, measurements.camera_poses)
+    >>> X.shape
+    (4, 4)
     """
 
 def closed_form_methods() -> list[tuple[str, str, str]]:
-    """Name, family ("AX = XB" or "AX = YB") and paper of every method."""
+    """Name, family ("AX = XB" or "AX = YB") and paper of every method.
+
+    >>> [name for name, family, _ in _core.closed_form_methods() if family == "AX = XB"][:2]
+    ['shiu_ahmad', 'tsai_lenz']
+    """
 
 # Least squares
 
@@ -217,6 +322,8 @@ class Model:
 
     `pixel_sigma` (K,): noise of each view in px. `chain_prior`: means X, Y (4, 4) and standard deviations
     (6,) of their twists.
+
+    >>> model = _core.Model([0.1] * len(measurements))  # px
     """
 
     def __init__(
@@ -227,7 +334,14 @@ class Model:
     ) -> None: ...
 
 class Problem:
-    """Measurements: view k holds the points `offsets[k]:offsets[k + 1]` and was taken at `A = motions[k]`."""
+    """Measurements: view k holds the points `offsets[k]:offsets[k + 1]` and was taken at `A = motions[k]`.
+
+    >>> problem = measurements.problem
+    >>> problem.view_count
+    9
+    >>> problem.squared_error(estimate.X.matrix, estimate.Y.matrix) > 0  # px^2
+    True
+    """
 
     def __init__(
         self,
@@ -258,7 +372,13 @@ class Problem:
         """Sum of squared residuals in px^2; infinite where the target is out of sight."""
 
 class Solution:
-    """The answer of a solve."""
+    """The answer of a solve.
+
+    >>> X, Y = _core.closed_form("park_martin", measurements.motions, measurements.camera_poses)
+    >>> found = measurements.problem.solve(X, Y, _core.Model([0.1] * len(measurements)))
+    >>> found.is_converged, found.covariance.shape
+    (True, (12, 12))
+    """
 
     @property
     def x(self) -> NDArray[float64]:
@@ -293,6 +413,17 @@ class Agreement:
 
     `stations` are `T_base_flange` (N, 4, 4); at each the image `images[n]` of `seen` was taken, read as
     `poses[n]` (N, 4, 4). `variances_px2` and `camera` as in `estimate_cell`.
+
+    >>> seen = _core.PoseMeasurements(measurements.problem, measurements.camera_poses, board_scale=True)
+    >>> poses = np.array([view.T_base_flange.matrix for view in recording.views])
+    >>> which, variances = list(range(len(poses))), seen.variances_px2
+    >>> both = estimate.X.matrix, estimate.Y.matrix
+    >>> known = True, 0, False, None  # a camera on the flange without free parameters
+    >>> one = _core.Agreement(
+    ...     poses, which, measurements.camera_poses, seen, variances, known, *both
+    ... )
+    >>> len(one.fit(which, None, 5)[8])  # probabilities of all views
+    9
     """
 
     def __init__(
@@ -334,6 +465,9 @@ class Belief:
     """Information (n, n) of all global parameters and what follows from it.
 
     Raises DegenerateError if it is singular.
+
+    >>> _core.Belief(4 * np.eye(12)).covariance.max().tolist()
+    0.25
     """
 
     def __init__(self, information: ArrayLike) -> None: ...
@@ -355,6 +489,9 @@ class Criterion:
 
     `tasks` (P, d, n): rows over all parameters. A view is worth what it takes off the root mean square of the
     tasks' summed variances.
+
+    >>> _core.Criterion("entropy").name
+    'entropy'
     """
 
     def __init__(
@@ -378,6 +515,14 @@ class Predictor:
     A. `kinematic_count`: constants of the arm among the parameters. `arm` of the candidates: roots (N, 6,
     r) of the noise of the joints on the left of A, and columns (N, 6, kinematic_count) of the constants;
     without it the constants move nothing.
+
+    >>> both = estimate.X.matrix, estimate.Y.matrix
+    >>> on = camera.lens, camera.parameters, board.points, np.zeros(len(board.points))
+    >>> predictor = _core.Predictor(*on, *both, pixel_sigma=0.1)
+    >>> told = predictor.informations(measurements.motions)  # of the views that were taken
+    >>> belief, criterion = _core.Belief(told.sum(axis=0)), _core.Criterion("entropy")
+    >>> predictor.gains(belief, criterion, measurements.motions).shape
+    (9,)
     """
 
     def __init__(
@@ -432,10 +577,21 @@ def start_from_poses(
     start: tuple[ArrayLike, ArrayLike] | None = None,
     prior_sigma_m: float = 1.0,
 ) -> tuple[NDArray[float64], NDArray[float64], float, str]:
-    """X, Y, cost and origin that fit `poses[k] ~ X motions[k] Y` (K, 4, 4), from many starts and a prior."""
+    """X, Y, cost and origin that fit `poses[k] ~ X motions[k] Y` (K, 4, 4), from many starts and a prior.
+
+    >>> C, alike = measurements.camera_poses, np.tile(1e-6 * np.eye(6), (len(measurements), 1, 1))
+    >>> X, Y, cost, origin = _core.start_from_poses(measurements.motions, C, alike)
+    >>> np.allclose(X, estimate.X.matrix, atol=0.01)
+    True
+    """
 
 class PoseMeasurements:
-    """Views of one target through one camera, each as a pose (K, 4, 4) with its covariance."""
+    """Views of one target through one camera, each as a pose (K, 4, 4) with its covariance.
+
+    >>> seen = _core.PoseMeasurements(measurements.problem, measurements.camera_poses)
+    >>> seen.covariances.shape
+    (9, 6, 6)
+    """
 
     def __init__(
         self,
@@ -473,7 +629,16 @@ class PoseMeasurements:
         """Pixel variance of each view, drawn to their median, px^2."""
 
 class Posterior:
-    """What is believed of a cell."""
+    """What is believed of a cell.
+
+    >>> seen = _core.PoseMeasurements(measurements.problem, measurements.camera_poses)
+    >>> stations = np.array([view.T_base_flange.matrix for view in recording.views])
+    >>> one = 0, 0, seen, list(range(len(stations))), seen.variances_px2
+    >>> on_flange = True, 0, False, None  # a camera that is taken as known
+    >>> found = _core.estimate_cell(stations, [on_flange], [False], [one], pairs=5, most_rounds=20)
+    >>> found.x.shape, found.covariance.shape
+    ((1, 4, 4), (12, 12))
+    """
 
     @property
     def x(self) -> NDArray[float64]:
@@ -556,6 +721,14 @@ def estimate_cell(
     A tip is whether it is on the flange, where (3,), and how well that is known, information (3, 3); three
     parameters each behind those of the boards. A touch is its station, behind those of the pictures, one tip
     or two, a target with the point (3,) of it, and the covariance (3, 3) of how well the two met.
+
+    >>> seen = _core.PoseMeasurements(measurements.problem, measurements.camera_poses)
+    >>> stations = np.array([view.T_base_flange.matrix for view in recording.views])
+    >>> one = 0, 0, seen, list(range(len(stations))), seen.variances_px2
+    >>> on_flange = True, 0, False, None  # a camera that is taken as known
+    >>> found = _core.estimate_cell(stations, [on_flange], [False], [one], pairs=5, most_rounds=20)
+    >>> np.allclose(found.x[0], estimate.X.matrix, atol=0.01)
+    True
     """
 
 # Kinematics
@@ -567,6 +740,10 @@ class Chain:
     about or slides along `axes[i]` (3,), and moves from `limits[i][0]` to `limits[i][1]` (radians or metres,
     may be infinite).
     `tip` (4, 4) is the flange in the frame of the last joint. Raises `InputError` for what is no chain.
+
+    >>> turning = _core.Chain([np.eye(4)], [[0.0, 0.0, 1.0]], [False], [[-3.0, 3.0]], Pose.identity().matrix)
+    >>> turning.forward([[0.0]])[0].tolist() == np.eye(4).tolist()
+    True
     """
 
     def __init__(
@@ -629,6 +806,10 @@ def least_gaps(
 
     The ends of both capsules of a pair are among the points (N, P, 3) of a posture; `radii` are the sums of
     the radii of each pair. Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
+
+    >>> ends = [[[0.0, 0, 0], [1, 0, 0], [0, 0.5, 0], [1, 0.5, 0]]]  # two parallel rods
+    >>> _core.least_gaps(ends, [(0, 1, 2, 3)], [0.2]).round(6).tolist()
+    [0.3]
     """
 
 # Several views at once
@@ -645,6 +826,10 @@ def select_views(
 
     `objective`: entropy, entropy_handeye, or tool_point with points (P, 3) in the camera frame. Worth is
     `ln |Lambda|`, `ln |Lambda| - ln |Lambda_nn|`, or minus the mean variance in square metres.
+
+    >>> pool = [np.eye(12), 3 * np.eye(12), 2 * np.eye(12)]
+    >>> _core.select_views(np.eye(12), pool, 1, "entropy")[0]
+    [1]
     """
 
 def certify_views(
@@ -657,4 +842,10 @@ def certify_views(
     iterations: int = 300,
     tolerance: float = 1e-4,
 ) -> tuple[float, float, float]:
-    """Worth of a choice, a bound that no choice of as many views exceeds, and the efficiency between them."""
+    """Worth of a choice, a bound that no choice of as many views exceeds, and the efficiency between them.
+
+    >>> pool = [np.eye(12), 3 * np.eye(12), 2 * np.eye(12)]
+    >>> _, _, efficiency = _core.certify_views(np.eye(12), pool, [1], "entropy")
+    >>> efficiency > 0.99
+    True
+    """

@@ -262,8 +262,6 @@ def render(
 def clutter(width_px: int, height_px: int, random: np.random.Generator, *, shapes: int = 150) -> Image:
     """Return a background (H, W) full of boxes and ellipses of all sizes and greys.
 
-    Raises nothing.
-
     Parameters
     ----------
     width_px, height_px

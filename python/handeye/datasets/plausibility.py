@@ -47,8 +47,6 @@ class DataWarning:
 def recording_warnings(recording: Recording) -> tuple[DataWarning, ...]:
     """Return what looks wrong with a recording.
 
-    Raises nothing.
-
     Examples
     --------
     >>> recording_warnings(recording)

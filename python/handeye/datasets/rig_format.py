@@ -131,8 +131,6 @@ def read_rig(folder: str | os.PathLike[str]) -> LoadedRig:
 def rig_warnings(recording: RigRecording) -> tuple[DataWarning, ...]:
     """Return what is possible but hardly meant in the views of any pair, each said once.
 
-    Raises nothing.
-
     Examples
     --------
     >>> rig_warnings(rig)

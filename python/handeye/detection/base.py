@@ -159,8 +159,6 @@ class NotFound:
 def relabeled(detection: Detection, permutation: IndexArray) -> Detection:
     """Return the detection with point i called `permutation[i]`, as the symmetries of a target have it.
 
-    Raises nothing.
-
     Parameters
     ----------
     detection

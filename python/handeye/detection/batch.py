@@ -101,7 +101,7 @@ def detect_all(
     busy the machine is. Whatever `progress` raises, an interruption too, ends the work after the images that
     are being looked at.
 
-    Raises nothing of its own; errors of images are in the answer.
+    Errors of images are in the answer.
 
     Parameters
     ----------

@@ -69,8 +69,6 @@ def explained(image: Image, target: Target, missing: NotFound) -> Detection | No
 def shown_board(image: Image) -> Target | None:
     """Return the board that an image shows, of lengths that are not known; None if it shows none.
 
-    Raises nothing.
-
     Examples
     --------
     >>> print(shown_board(np.full((480, 640), 255, np.uint8)))
@@ -228,8 +226,6 @@ def _difference(target: Target, shown: Target) -> str:
 
 def without_lengths(board: Target) -> str:
     """Return a board in words, without what a picture does not tell.
-
-    Raises nothing.
 
     Examples
     --------

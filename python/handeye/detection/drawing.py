@@ -28,8 +28,6 @@ def drawn_over(image: Image, target: Target | None, outcome: Detection | NotFoun
 
     The x axis is red and the y axis green. Where nothing was found, the image says why.
 
-    Raises nothing.
-
     Parameters
     ----------
     image

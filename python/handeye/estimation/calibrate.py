@@ -35,8 +35,6 @@ def make_estimator(
 ) -> Estimator:
     """Return what estimates under a model's assumptions; the paper's has no use for arm or touches.
 
-    Raises nothing.
-
     Parameters
     ----------
     model
@@ -239,8 +237,6 @@ def require_determined(estimate: Estimate) -> None:
 
 def to_calibration(measurements: Measurements, estimate: Estimate) -> Calibration:
     """Return the calibration of an estimate: residuals of every view, covariance, warnings.
-
-    Raises nothing.
 
     Parameters
     ----------

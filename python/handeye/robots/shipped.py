@@ -17,8 +17,6 @@ _SUFFIX = ".urdf"
 def shipped_arms() -> tuple[str, ...]:
     """Return the names of the arms that are described in this package.
 
-    Raises nothing.
-
     Examples
     --------
     >>> "ur5e" in shipped_arms()

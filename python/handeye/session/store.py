@@ -321,8 +321,6 @@ def opened(folder: Path, kind: type[S]) -> S:
 def is_session(folder: Path) -> bool:
     """Tell whether a folder holds a session.
 
-    Raises nothing.
-
     Examples
     --------
     >>> is_session(folder)
