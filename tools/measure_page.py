@@ -3,18 +3,25 @@
     .venv/bin/python tools/measure_page.py
 
 Prints, for 5,000 candidates and 50 views, the time from a key press to the scene drawn again, and from the
-press of a view to its residuals on the page (median and largest of 20). Then how long the steps of the loop
-take in a simulated session with rendered pictures, without a page and with such a crowded one that is open:
-in turns, by the clock on the wall, with no time spent on motions. Needs chromium.
+press of a view to its residuals on the page (median and largest of 20). Needs chromium.
+
+Then pairs of simulated sessions with rendered pictures and no time spent on motions, one without a page and
+one with such a crowded page that is looked at, either first in turns: how much longer the steps took by the
+clock on the wall, and how much more processor time the loop's own thread and the whole program took (the
+median of the pairs). Who looks on is `tools/watch_page.py` in a process of its own, which fetches what a
+browser fetches and draws nothing: a browser on the same machine takes its time from everybody, page or not.
 """
 
 import argparse
+import json
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,9 +33,10 @@ from handeye.planning import Pool  # noqa: E402
 from handeye.planning.candidates import Candidate  # noqa: E402
 from handeye.robots import open_arm  # noqa: E402
 from handeye.robots.protocol import Reading  # noqa: E402
-from handeye.session import End, Observer  # noqa: E402
+from handeye.session import End  # noqa: E402
 from handeye.session.configuration import begin, prepare  # noqa: E402
 from handeye.session.deciding import Considered, Step  # noqa: E402
+from handeye.session.prepared import Prepared  # noqa: E402
 from handeye.session.settings import Configuration, Simulation  # noqa: E402
 from handeye.types import Pose, View  # noqa: E402
 from handeye.ui import Dashboard, Hub, Server  # noqa: E402
@@ -36,10 +44,10 @@ from handeye.ui.documents import Shown  # noqa: E402
 from handeye.ui.still import Still  # noqa: E402
 
 CANDIDATES, VIEWS, TIMES = 5000, 50, 20
-STEPS, TURNS = 12, 5
 QUICK = Configuration(
     "ur5e", accuracy_mm=None, accuracy_deg=None, most_views=8, simulation=Simulation(points_only=0.1)
 )
+RENDERED = replace(QUICK, most_views=12, simulation=Simulation())
 
 
 def crowded() -> Shown:
@@ -132,73 +140,85 @@ class Crowded(Dashboard):
         super()._told(step, replace(shown, views=crowd.views, considered=crowd.considered), count)
 
 
-def session_seconds(folder: Path, dashboard: Dashboard | None) -> tuple[list[float], float]:
-    """Run a session as `drive` does.
+class Spent(NamedTuple):
+    """Seconds that a session took: on the wall, and of the processor by the loop's thread and by all."""
 
-    Return how long each step of the loop took by the clock on the wall, and the processor time of all.
-    """
-    observer = Observer() if dashboard is None else dashboard
-    asked = replace(QUICK, most_views=STEPS, simulation=Simulation())
-    prepared = prepare(asked, observer=observer)
+    wall: float
+    loop: float
+    program: float
+
+
+def spent(prepared: Prepared, folder: Path, dashboard: Dashboard | None) -> Spent:
+    """Run a session as `drive` does."""
     session, store = begin(prepared, folder / "s")
     if dashboard is not None:
         dashboard.prepare(prepared, store)
-    seconds: list[float] = []
-    spent = time.process_time()
+    began = (time.perf_counter(), time.thread_time(), time.process_time())
     step: Step | End | None = None
     while not isinstance(step, End):
-        began = time.perf_counter()
         step = session.next()
         if dashboard is not None:
             dashboard.decided(step, session)
             dashboard.waits(waits=False)
+            dashboard.hub.next_command(0)
         if isinstance(step, Step):
             session.take(step)
-        seconds.append(time.perf_counter() - began)
-    spent = time.process_time() - spent
+    ended = (time.perf_counter(), time.thread_time(), time.process_time())
     store.close()
-    return seconds, spent
+    return Spent(*(after - before for before, after in zip(began, ended, strict=True)))
 
 
-def loop() -> None:
-    """Compare the steps of the loop with a page that is open, and without one, in turns."""
+def alone() -> Spent:
+    """Run a session that nobody looks at."""
+    with tempfile.TemporaryDirectory() as folder:
+        return spent(prepare(RENDERED), Path(folder), None)
+
+
+def watched(crowd: Shown) -> Spent:
+    """Run a session whose page is looked at."""
     hub = Hub()
-    dashboard = Crowded(hub, crowded())
+    dashboard = Crowded(hub, crowd)
     server = Server(hub, pictures=dashboard)
-    alone, watched = list[float](), list[float]()
-    processor = {False: 0.0, True: 0.0}
-    with tempfile.TemporaryDirectory() as name, browser(Path(name)) as opened:
-        for turn in range(TURNS):
-            for times, shown in ((alone, None), (watched, dashboard)):
-                window = None if shown is None else opened(server.address)
-                with tempfile.TemporaryDirectory() as folder:
-                    if window is not None:
-                        window.page.wait_for_timeout(1000)
-                    found, spent = session_seconds(Path(folder), shown)
-                    if turn:  # the first has much to import
-                        times.extend(found)
-                        processor[window is not None] += spent
-                if window is not None:
-                    window.page.close()
+    watcher = subprocess.Popen([sys.executable, str(ROOT / "tools" / "watch_page.py"), server.address])
+    while json.loads(hub.document("people"))["data"]["watchers"] == 0:
+        time.sleep(0.05)
+    with tempfile.TemporaryDirectory() as folder:
+        found = spent(prepare(RENDERED, observer=dashboard), Path(folder), dashboard)
     server.close()
-    told("a step of the loop alone", alone)
-    told(f"with a page of {CANDIDATES} candidates and {VIEWS} views", watched)
-    more = [sum(watched[i :: STEPS + 1]) / sum(alone[i :: STEPS + 1]) for i in range(STEPS + 1)]
-    median = 100 * (statistics.median(more) - 1)
-    more_spent = 100 * (processor[True] / processor[False] - 1)
-    print(f"processor time of the program, server and all: {more_spent:.1f} % more")
-    print(f"slower by {100 * (sum(watched) / sum(alone) - 1):.1f} %, the median step by {median:.1f} %")
+    watcher.wait()
+    return found
+
+
+def loop(pairs: int) -> None:
+    """Compare sessions with a page that is looked at, and without one, in pairs."""
+    crowd = crowded()
+    alone()  # the first has much to import
+    more: list[list[float]] = []
+    for pair in range(pairs):
+        if pair % 2:
+            with_page, without = watched(crowd), alone()
+        else:
+            without, with_page = alone(), watched(crowd)
+        others = (with_page.program - with_page.loop) - (without.program - without.loop)
+        ratios = [100 * (one / other - 1) for one, other in zip(with_page, without, strict=True)]
+        more.append([*ratios, 100 * others / without.program])
+        print(f"pair {pair + 1}: " + ", ".join(f"{value:.1f} %" for value in more[-1]), flush=True)
+    wall, own, program, others = (statistics.median(column) for column in zip(*more, strict=True))
+    print(f"{pairs} pairs, the session took {wall:.1f} % longer by the clock on the wall (median)")
+    print(f"processor time: the loop's thread {own:.1f} % more, the whole program {program:.1f} % more")
+    print(f"threads of the page alone: {others:.1f} % of the program's processor time without them")
 
 
 def main() -> None:
     """Measure both."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=["interactions", "loop"])
-    only = parser.parse_args().only
-    if only != "loop":
+    parser.add_argument("--pairs", type=int, default=10)
+    asked = parser.parse_args()
+    if asked.only != "loop":
         interactions()
-    if only != "interactions":
-        loop()
+    if asked.only != "interactions":
+        loop(asked.pairs)
 
 
 if __name__ == "__main__":

@@ -2,11 +2,12 @@
 
 import json
 import threading
+import time
 
 import pytest
 
 from handeye.errors import InputError
-from handeye.ui.hub import MOST_WATCHERS, Command, Hub
+from handeye.ui.hub import MOST_WATCHERS, SHARE, Command, Hub
 
 ANNE, BERT = "a" * 16, "b" * 16
 
@@ -29,6 +30,58 @@ def test_waiting_ends_with_a_change() -> None:
     seen = hub.versions()
     threading.Timer(0.05, lambda: hub.publish("scene", dict)).start()
     assert hub.wait(seen, 10.0) == seen | {"scene": 1}
+
+
+def spend(seconds: float) -> None:
+    """Compute for so long."""
+    until = time.process_time() + seconds
+    while time.process_time() < until:
+        pass
+
+
+def test_a_session_that_computes_is_left_alone_until_the_last_telling_was_paid_for() -> None:
+    hub = Hub()
+    hub.publish("scene", dict)
+    seen = hub.wait({}, 0)
+    hub.rests(resting=False)
+    hub.charge("scene", 0.4 * SHARE)
+    hub.publish("scene", dict)
+    assert hub.wait(seen, 0) == seen
+    hub.say("Words cost nothing.")
+    hub.charge("talk", 1000.0)
+    hub.say("Nor do these.")
+    seen |= {"talk": 3}
+    assert hub.wait(seen, 0) == seen
+    spend(0.45)
+    assert hub.wait(seen, 0) == seen | {"scene": 2}
+
+
+def test_a_program_that_has_nothing_to_do_tells_at_once() -> None:
+    hub = Hub()
+    hub.publish("scene", dict)
+    seen = hub.wait({}, 0)
+    hub.rests(resting=False)
+    hub.charge("scene", 1000.0)
+    hub.publish("scene", dict)
+    assert hub.wait(seen, 0) == seen
+    assert hub.wait(seen, 10.0) == seen | {"scene": 2}
+
+
+def test_a_session_rests_while_it_waits_for_a_person() -> None:
+    hub = Hub()
+    hub.rests(resting=False)
+    assert hub.next_command(0) is None
+    assert not hub.rests(resting=False)
+    waiting = threading.Thread(target=hub.next_command, args=(None,))
+    waiting.start()
+    hub.publish("scene", dict)
+    hub.charge("scene", 1000.0)
+    seen = hub.wait(hub.versions() | {"scene": 0}, 10.0)
+    assert seen["scene"] == 1
+    hub.enter(ANNE)
+    hub.command(ANNE, Command("go"))
+    waiting.join(10)
+    assert not hub.rests(resting=False)
 
 
 def test_the_first_page_drives_until_another_takes_over() -> None:

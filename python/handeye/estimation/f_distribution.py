@@ -4,6 +4,7 @@ Written out here because the installed package has no statistics library.
 """
 
 import math
+from functools import lru_cache
 
 from handeye.codes import Code
 from handeye.errors import InputError
@@ -74,6 +75,7 @@ def f_cumulative(value: float, numerator: float, denominator: float) -> float:
     return regularised_incomplete_beta(numerator / 2, denominator / 2, scaled / (scaled + denominator))
 
 
+@lru_cache(maxsize=256)
 def f_quantile(probability: float, numerator: float, denominator: float) -> float:
     """Return the value that F stays below with a probability, by bisection to the last digits.
 

@@ -13,7 +13,7 @@ from handeye.types import View
 from handeye.ui import documents
 from handeye.ui.documents import Picture, Shown
 from handeye.ui.hub import Hub
-from handeye.ui.live import Curve, LiveDashboard, added, asked_of, chosen
+from handeye.ui.live import Curve, LiveDashboard, added, asked_of
 
 
 class Dashboard(LiveDashboard[Shown, Session]):
@@ -77,7 +77,6 @@ class Dashboard(LiveDashboard[Shown, Session]):
             goal=None if ended else step.goal,
             estimate=estimate,
             considered=None if ended else step.considered,
-            chosen=None if ended else chosen(step) or step.goal.label,
             known=known,
             gains=self._with_gain(shown.gains, step.estimate if ended else estimate),
             rejected=session.rejected,

@@ -20,9 +20,14 @@ ABSENT_S = 5.0
 # Pages that may look on at a time.
 MOST_WATCHERS = 32
 _MOST_MESSAGES = 60
-# Seconds between two tellings of a document that takes time to make: a loop that runs on by itself is not
-# slowed by pages that look on, and a person who presses a button waits for nothing.
-PAUSES_S = {"scene": 0.5, "picture": 0.5, "candidates": 2.0, "knowledge": 1.0, "views": 1.0}
+# While a session computes, making and sending a document may take this part of the program's processor time:
+# a loop that runs on by itself is hardly slowed by pages that look on. Words are free, and nothing is held
+# back while the session waits for a person, or the program has used less than this part of the time.
+SHARE, IDLE = 0.002, 0.01
+_FREE = {"talk", "people"}
+# In seconds: what telling all pages costs at least, how often it is seen whether they may be told, and how
+# long the program must have been idle.
+_LEAST_S, _POLL_S, _IDLE_S = 5e-4, 0.25, 1.0
 
 
 @dataclass(frozen=True)
@@ -37,13 +42,18 @@ class Command:
 class _Section:
     version: int
     build: Callable[[], Any]
+    # The version that pages know of, and the processor time at which they may be told of another one.
+    told: int = 0
+    free_at_s: float = 0.0
     built: bytes | None = None
+    making: threading.Lock = field(default_factory=threading.Lock)
 
 
 class Hub:
     """Documents by name, each with a version that grows; commands; and the one page that drives.
 
-    A document is made when a page asks for it, not when it changes: nobody looking costs nothing.
+    A document is made when a page asks for it, not when it changes: nobody looking costs nothing. While the
+    session computes, pages are told of a change once the last telling was paid for; see `SHARE`.
     """
 
     def __init__(self) -> None:
@@ -55,6 +65,8 @@ class Hub:
         self._watchers: dict[str, int] = {}
         self._driver: str | None = None
         self._driver_left = 0.0
+        self._resting, self._idle = True, False
+        self._seen_idle = time.monotonic(), time.process_time()
         self._question: dict[str, str] | None = None
         self._answers: queue.Queue[str | None] = queue.Queue()
         self.closed = False
@@ -67,42 +79,63 @@ class Hub:
         """Put a document in place of the last one of its name; `build` makes it when it is asked for."""
         with self._changed:
             before = self._sections.get(name)
-            self._sections[name] = _Section(1 if before is None else before.version + 1, build)
-            self._changed.notify_all()
+            if before is None:
+                self._sections[name] = _Section(1, build)
+            else:
+                version = before.version + 1
+                self._sections[name] = _Section(version, build, before.told, before.free_at_s)
+            if self._tell():
+                self._changed.notify_all()
+
+    def rests(self, *, resting: bool) -> bool:
+        """Say whether the session waits for a person; return what was said before."""
+        with self._changed:
+            before, self._resting = self._resting, resting
+        return before
+
+    def charge(self, name: str, seconds: float) -> None:
+        """Say how much processor time it took to make and to send a document."""
+        with self._changed:
+            section = self._sections.get(name)
+            if section is not None and name not in _FREE:
+                section.free_at_s = (
+                    max(section.free_at_s, time.process_time()) + max(seconds, _LEAST_S) / SHARE
+                )
 
     def versions(self) -> dict[str, int]:
         """Return the version of every document."""
         with self._changed:
             return {name: section.version for name, section in self._sections.items()}
 
-    def wait(
-        self, seen: dict[str, int], seconds: float, told: dict[str, float] | None = None
-    ) -> dict[str, int]:
-        """Return the versions once they differ from those seen, or after so many seconds.
-
-        Parameters
-        ----------
-        seen
-            Versions that the caller knows.
-        seconds
-            How long to wait at most.
-        told
-            When the caller was told of each document, filled here; without it every change is told at once,
-            else those of `PAUSES_S` after a pause.
-        """
+    def wait(self, seen: dict[str, int], seconds: float) -> dict[str, int]:
+        """Return the versions to tell once they differ from those seen, or after so many seconds."""
         deadline = time.monotonic() + seconds
         with self._changed:
             while not self.closed:
-                now = time.monotonic()
-                changed = {n: s.version for n, s in self._sections.items() if s.version != seen.get(n)}
-                dues = {n: 0.0 if told is None else told.get(n, -1e9) + PAUSES_S.get(n, 0.0) for n in changed}
-                due = {name: version for name, version in changed.items() if dues[name] <= now}
-                if due or now >= deadline:
-                    if told is not None:
-                        told |= dict.fromkeys(due, now)
-                    return seen | due
-                self._changed.wait(min([deadline, *dues.values()]) - now)
+                self._tell()
+                told = {name: section.told for name, section in self._sections.items() if section.told}
+                left = deadline - time.monotonic()
+                if seen | told != seen or left <= 0:
+                    return seen | told
+                self._changed.wait(left if self._resting else min(_POLL_S, left))
         return seen
+
+    def _tell(self) -> bool:
+        """Let pages know of what has changed and is paid for; return whether there is anything."""
+        now, spent = time.monotonic(), time.process_time()
+        before, spent_before = self._seen_idle
+        if now - before >= _IDLE_S:
+            self._idle = spent - spent_before < IDLE * (now - before)
+            self._seen_idle = now, spent
+        free = self._resting or self._idle
+        due = [
+            section
+            for section in self._sections.values()
+            if section.told != section.version and (free or section.free_at_s <= spent)
+        ]
+        for section in due:
+            section.told = section.version
+        return bool(due)
 
     def document(self, name: str) -> bytes:
         """Return a document as JSON.
@@ -116,10 +149,11 @@ class Hub:
             section = self._sections.get(name)
         if section is None:
             raise InputError(f"no document {name[:40]!r}", code=Code.UNKNOWN_DOCUMENT)
-        if section.built is None:
-            body = {"version": section.version, "data": section.build()}
-            section.built = msgspec.json.encode(body)
-        return section.built
+        with section.making:
+            if section.built is None:
+                body = {"version": section.version, "data": section.build()}
+                section.built = msgspec.json.encode(body)
+            return section.built
 
     # Commands
 
@@ -149,10 +183,13 @@ class Hub:
 
     def next_command(self, seconds: float | None) -> Command | None:
         """Return the next command, None if there is none within so many seconds; None waits for ever."""
+        self.rests(resting=seconds != 0)
         try:
             return self._commands.get(timeout=seconds) if seconds != 0 else self._commands.get_nowait()
         except queue.Empty:
             return None
+        finally:
+            self.rests(resting=False)
 
     def _stopped(self) -> None:
         trouble = None if self._stop is None else self._stop()
@@ -181,7 +218,11 @@ class Hub:
             self._answers.get_nowait()
         self._question = {"id": secrets.token_hex(4), "text": question}
         self.publish("talk", self._talk)
-        answer = self._answers.get()
+        before = self.rests(resting=True)
+        try:
+            answer = self._answers.get()
+        finally:
+            self.rests(resting=before)
         self._question = None
         self.publish("talk", self._talk)
         if answer is None:

@@ -249,14 +249,6 @@ def added(known: Curve, count: int, mm: float, deg: float) -> Curve:
     return (*(row for row in known if row[0] < count), (count, mm, deg))
 
 
-def chosen(step: Step) -> str | None:
-    """Return the name of the candidate that a step goes to."""
-    for candidate in () if step.considered is None else step.considered.pool.candidates:
-        if candidate.T_base_flange == step.goal.T_base_flange:
-            return candidate.name
-    return None
-
-
 def jpeg(image: Grey) -> bytes | None:
     """Return an image as JPEG."""
     good, data = cv2.imencode(".jpg", image, [int(cv2.IMWRITE_JPEG_QUALITY), _QUALITY])

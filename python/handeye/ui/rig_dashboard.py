@@ -14,7 +14,7 @@ from handeye.session.rig_store import RigStore
 from handeye.types import View
 from handeye.ui import rigs
 from handeye.ui.documents import Picture, Shown
-from handeye.ui.live import Curve, LiveDashboard, added, asked_of, chosen
+from handeye.ui.live import Curve, LiveDashboard, added, asked_of
 from handeye.ui.rigs import ShownRig, with_belief
 
 
@@ -51,11 +51,10 @@ class RigDashboard(LiveDashboard[ShownRig, RigSession]):
         if shown is None:
             return
         recording, believed = session.recording, None
-        values: dict[str, Any] = {"goal": None, "considered": None, "chosen": None}
+        values: dict[str, Any] = {"goal": None, "considered": None}
         if isinstance(step, Step):
             believed = step.believed
-            name = chosen(step) or step.goal.label
-            values = {"goal": step.goal, "considered": step.considered, "chosen": name}
+            values = {"goal": step.goal, "considered": step.considered}
         else:
             believed = step.estimate
         parts = {

@@ -10,7 +10,9 @@ import ipaddress
 import json
 import secrets
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -97,7 +99,7 @@ class Server:
         self._server.owner = self
         self.host, self.port = host, int(self._server.server_address[1])
         self._thread = threading.Thread(
-            target=self._server.serve_forever, args=(0.05,), name="page", daemon=True
+            target=self._server.serve_forever, args=(0.25,), name="page", daemon=True
         )
         self._thread.start()
 
@@ -150,9 +152,11 @@ class _Handler(BaseHTTPRequestHandler):
         elif first == "events":
             self._events(asked.get("page", [""])[0])
         elif first == "document":
-            self._guarded(lambda: self._send(self._owner.hub.document(rest), "application/json"))
+            with self._charged(rest):
+                self._guarded(lambda: self._send(self._owner.hub.document(rest), "application/json"))
         elif self._owner.pictures is not None and first in {"picture", "view", "view_picture"}:
-            self._pictured(self._owner.pictures, first, unquote(rest))
+            with self._charged("picture"):
+                self._pictured(self._owner.pictures, first, unquote(rest))
         else:
             self._refuse(HTTPStatus.NOT_FOUND, "nothing here")
 
@@ -278,9 +282,8 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header("Cache-Control", "no-store")
             self.end_headers()
             seen: dict[str, int] = {}
-            told: dict[str, float] = {}
             while not hub.closed:
-                seen = hub.wait(seen, _BEAT_S, told)
+                seen = hub.wait(seen, _BEAT_S)
                 self.wfile.write(b"data: " + json.dumps(seen).encode() + b"\n\n")
                 self.wfile.flush()
         except OSError:
@@ -291,6 +294,13 @@ class _Handler(BaseHTTPRequestHandler):
     def _file(self, name: str) -> None:
         content = files("handeye.ui").joinpath("static", name).read_bytes()
         self._send(content, _TYPES[name[name.rindex(".") :]])
+
+    @contextmanager
+    def _charged(self, name: str) -> Generator[None]:
+        """Charge a document with the processor time that an answer takes."""
+        began = time.thread_time()
+        yield
+        self._owner.hub.charge(name, time.thread_time() - began)
 
     def _guarded(self, answer: Callable[[], None]) -> None:
         try:

@@ -30,7 +30,7 @@ const scene = new Scene($("scene"), $("tip"));
 const draw = {
   model: (d) => scene.setModel(d),
   scene: (d) => { scene.setScene(d); panels.legend(d, data.candidates); },
-  candidates: (d) => { scene.setCandidates(d); panels.candidates(d); panels.legend(data.scene, d); },
+  candidates: (d) => { d.poses = rows(d.poses); d.ruled_out = rows(d.ruled_out); scene.setCandidates(d); panels.candidates(d); panels.legend(data.scene, d); },
   status: (d) => { panels.status(d, drives()); if (data.people) panels.people(data.people, drives()); if (data.views) panels.views(data.views, drives(), d); },
   people: (d) => { panels.people(d, drives()); if (data.status) panels.status(data.status, drives()); },
   talk: (d) => panels.talk(d),
@@ -39,6 +39,12 @@ const draw = {
   picture: (d) => panels.picture(d),
 };
 const drives = () => Boolean(data.people && data.people.driver === page.slice(0, 8) && data.status && data.status.drives);
+
+// Poses that came packed: rows of twelve 32-bit numbers.
+function rows(packed) {
+  const numbers = new Float32Array(Uint8Array.from(atob(packed), (c) => c.charCodeAt(0)).buffer);
+  return Array.from({ length: numbers.length / 12 }, (_, i) => numbers.subarray(12 * i, 12 * i + 12));
+}
 
 async function update(name, version) {
   if (fetching[name]) { fetching[name] = version; return; }
