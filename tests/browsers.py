@@ -21,6 +21,7 @@ FLAGS = [
     "--disable-sync",
 ]
 WIDE, NARROW = (1360, 900), (400, 820)
+SERIOUS = {"serious", "critical"}
 
 needs_browser = pytest.mark.skipif(
     CHROMIUM is None or importlib.util.find_spec("playwright") is None,
@@ -47,6 +48,13 @@ class Window:
         """Nothing was complained about, and nobody but this machine was asked."""
         assert self.errors == []
         assert self.hosts <= {"127.0.0.1"}
+
+
+def serious(window: Window) -> list[tuple[str, str]]:
+    """Return what keeps people from reading or using what a window shows: the rule of axe, and where."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
+    found = axe.Axe().run(window.page).response["violations"]
+    return [(v["id"], v["nodes"][0]["html"][:200]) for v in found if v["impact"] in SERIOUS]
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from browsers import NARROW, Window, browser, needs_browser
+from browsers import NARROW, Window, browser, needs_browser, serious
 from handeye.datasets import write_rig
 from handeye.datasets.shipped import shipped_recording
 from handeye.notations import NOTATIONS, pose_text, read_pose_text
@@ -27,7 +27,6 @@ pytestmark = needs_browser
 QUICK = ("--points-only", "0.1")
 # Nothing ends it by itself before a busy machine has pressed a button.
 LONG = ("--accuracy-mm", "0.001", "--max-views", "400", "--anyway")
-SERIOUS = {"serious", "critical"}
 
 
 @pytest.fixture(scope="module")
@@ -206,6 +205,7 @@ def test_by_hand_with_typed_poses_and_brought_pictures(opened: Any, tmp_path: Pa
             expect(one.page.locator("#views tr")).to_have_count(number, timeout=60_000)
         expect(one.page.locator("#coverage")).to_contain_text("parts of the picture")
         assert is_painted(one, "#picture")
+        assert serious(one) == []
         expect(one.page.locator("#question-text")).to_have_text(re.compile("view_04"), timeout=60_000)
         one.page.get_by_role("button", name="Stop").click()
         answer(one, "pose of the flange now.*Enter if it has not moved", "")
@@ -235,6 +235,7 @@ def test_pages_about_a_folder(opened: Any, words: tuple[str, ...]) -> None:
         if words[0] == "plan":
             one.page.click("summary")
             expect(one.page.locator("#candidates li").first).to_contain_text("(next)")
+        assert serious(one) == []
         one.check()
 
 
@@ -256,6 +257,7 @@ def test_all_cameras_of_a_rig(opened: Any, tmp_path: Path) -> None:
         assert is_painted(one, "#scene")
         one.page.set_viewport_size({"width": NARROW[0], "height": NARROW[1]})
         assert one.page.evaluate("document.documentElement.scrollWidth") <= NARROW[0]
+        assert serious(one) == []
         one.check()
 
 
@@ -304,7 +306,6 @@ def test_a_rig_is_driven_by_clicks(opened: Any, tmp_path: Path) -> None:
 
 
 def test_the_page_can_be_used_without_seeing_or_pointing(opened: Any, tmp_path: Path) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
     with command("run", "--session", tmp_path / "s", *QUICK, "--ui") as (address, _):
         one = opened(address)
         state(one, "Waiting")
@@ -313,8 +314,7 @@ def test_the_page_can_be_used_without_seeing_or_pointing(opened: Any, tmp_path: 
             state(one, rf"view_0{number}\.1.*Waiting")
         for size in ((1360, 900), NARROW):
             one.page.set_viewport_size({"width": size[0], "height": size[1]})
-            found = axe.Axe().run(one.page).response["violations"]
-            assert [(v["id"], v["nodes"][0]["html"]) for v in found if v["impact"] in SERIOUS] == []
+            assert serious(one) == []
         before = one.page.locator("#scene").screenshot()
         one.page.focus("#scene")
         one.page.keyboard.press("ArrowLeft")
