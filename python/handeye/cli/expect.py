@@ -63,7 +63,7 @@ def expect(
     tilt_deg
         Largest angle at which the target is seen.
     cells
-        Number of cells that are simulated; without it so many that their mean is known to about a tenth.
+        Number of cells that are simulated; without it so many that their mean is known to about a fifteenth.
     workers
         Processes. The result does not depend on it.
     """
