@@ -42,8 +42,8 @@ def test_blocks_are_understood() -> None:
         s.command.split()[1] for s in shown.steps("\n".join(PAGES.values()))
     }
     assert len([s for s in shown.steps(PAGES["tutorial.md"]) if s.output]) >= 3
-    with pytest.raises(AssertionError, match="is nearest"):
-        shown.check(shown.Step("a", "within 2.5 mm"), "within 2.9 mm")
+    with pytest.raises(AssertionError, match="is printed"):
+        shown.check(shown.Step("a", "within 2.5 mm"), "2.5 mm of 3.0: within 2.9 mm")
     with pytest.raises(AssertionError, match="not printed"):
         shown.check(shown.Step("a", "two words"), "two other words")
 
