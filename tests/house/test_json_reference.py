@@ -302,6 +302,8 @@ def test_verify(handeye: Handeye, tmp_path: Path) -> None:
 def test_studies_of_work(handeye: Handeye) -> None:
     one = ("--workers", "1")
     compare("handeye study shift", handeye.json("study", "shift", "--trials", "1", *one))
+    nights = ("--trials", "1", "--nights", "4")
+    compare("handeye study shift --nights", handeye.json("study", "shift", *nights, *one))
     compare("handeye study probing", handeye.json("study", "probing", "--cells", "1", *one))
     few = ("--arms", "1", "--views", "9", "--postures", "20")
     compare("handeye study arm", handeye.json("study", "arm", *few, *one))

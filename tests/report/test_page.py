@@ -111,10 +111,11 @@ def test_page_says_what_there_is_to_say(mounting: Mounting, model: ModelName) ->
         assert said in reader.text, said
     for sentence in (*gathered.numbers.warnings, *(said.sentence[1:] for said in gathered.numbers.diagnosis)):
         assert sentence in reader.text
-    # Mount, cell, views, two curves, scale, mean residual, and a picture for every view that could be measured.
+    # Mount, touches, cell, views, two curves, scale, mean residual, and a picture for every view that could be
+    # measured.
     assert (
         reader.tags.count("svg")
-        == 3 + 2 * (model is ModelName.AUTO or len(gathered.numbers.curve) > 1) + 2 + 8
+        == 4 + 2 * (model is ModelName.AUTO or len(gathered.numbers.curve) > 1) + 2 + 8
     )
     assert "nan" not in re.sub(r"[a-z]*nan[a-z]+", "", reader.text.lower()).split()
     assert not re.search(r'[" ,ML](nan|inf|-inf)[" ,lZ]', page)

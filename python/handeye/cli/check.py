@@ -14,11 +14,12 @@ from handeye.cli.options import Common
 from handeye.cli.output import check_output, check_picture, write_figure, write_json
 from handeye.cli.source import Source
 from handeye.codes import Code
-from handeye.datasets.check_log import LoggedCheck, append_check, change_of, read_check_log
+from handeye.datasets.check_log import LoggedCheck, alike, append_check, read_check_log
 from handeye.datasets.images import read_image
 from handeye.detection import NotFound, detect
 from handeye.errors import ExitCode, InputError, printable
 from handeye.estimation import Estimate, Measurements, make_estimator, require_determined
+from handeye.estimation.change import change_of
 from handeye.estimation.faults import examine
 from handeye.estimation.shift import Check, check_views, plan_check
 from handeye.types import Recording, View
@@ -94,7 +95,7 @@ def check(
         else:
             new = _of_the_same(source.open(views, arm.described()).recording, opened.recording)
         measured = Measurements.of(estimate.mounting, estimate.camera, estimate.target, new)
-        answer = _checked(check_views(estimate, measured), opened.recording.name, log, picture)
+        answer = _checked(check_views(estimate, measured), measured, opened.recording.name, log, picture)
     if output is not None:
         write_json(output, answer.data)
     return answer
@@ -172,33 +173,38 @@ def _planned(estimate: Estimate, known: Measurements, count: int, name: str) -> 
     return Answer(data, show)
 
 
-def _checked(found: Check, name: str, log: Path | None, picture: Path | None) -> Answer:
+def _checked(
+    found: Check, measured: Measurements, name: str, log: Path | None, picture: Path | None
+) -> Answer:
     data: dict[str, Any] = {"recording": name, **found.to_dict(), "log": None}
     if log is not None:
-        best = max((cause.log_likelihood for cause in found.causes), default=0.0)
         now = LoggedCheck(
             datetime.now(UTC).isoformat(timespec="seconds"),
             found.p_value,
             found.moved.value,
-            best,
             found.sentence,
+            found.misfit,
+            tuple(tuple(view.T_base_flange.matrix[:3].ravel().tolist()) for view in measured.views),
         )
         earlier = read_check_log(log)
         append_check(log, now)
         checks = [*earlier, now]
-        change = change_of([one.score for one in checks])
+        same = alike(checks)
+        change = change_of([checks[number].misfit for number in same])
+        first = None if change.first is None else same[change.first]
         data["log"] = {
             "file": str(log),
             "checks": len(checks),
-            "moved_since": None if change.first is None else checks[change.first].time,
-            "moved_since_check": None if change.first is None else change.first + 1,
-            "score": change.score,
+            "compared": len(same),
+            "moved_since": None if first is None else checks[first].time,
+            "moved_since_check": None if first is None else first + 1,
+            "p_value": change.p_value,
         }
         if picture is not None:
             from handeye.studies.check_picture import check_figure  # noqa: PLC0415 - rarely wanted
 
             times = [(one.time, one.p_value) for one in checks]
-            write_figure(picture, check_figure(times, change.first))
+            write_figure(picture, check_figure(times, first))
 
     def show(console: "Console") -> None:
         from handeye.cli.wording import heading, notices  # noqa: PLC0415 - JSON need not wait for it

@@ -11,6 +11,7 @@ from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output
 from handeye.cli.source import Source
+from handeye.cli.work import WorkOptions, work_words
 from handeye.codes import Code
 from handeye.datasets.writing import replace_file
 from handeye.errors import OutputError
@@ -33,6 +34,7 @@ def report(
     reduced: bool = False,
     pictures: bool = False,
     source: Source = Source(),  # noqa: B008 - frozen
+    work: WorkOptions = WorkOptions(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
     """Write one page about a calibration: how good it is, how it came about, what limits it.
@@ -62,8 +64,10 @@ def report(
     if source.only is None and result.is_dir() and is_rig(result):
         if pictures:
             raise UsageError("pictures are shown of one camera", hint="give --only with --pictures")
+        if work != WorkOptions():
+            raise UsageError("the touch error is that of one camera", hint="give --only with the box of work")
         return _of_rig(result, output, model, source, reduced=reduced)
-    gathered = _gathered(result, output, model, source, reduced=reduced, is_drawn=pictures)
+    gathered = _gathered(result, output, model, source, work, reduced=reduced, is_drawn=pictures)
     page = html_page(gathered).encode()
     replace_file(output, page)
     return Answer(
@@ -97,19 +101,26 @@ def _of_rig(folder: Path, output: Path, model: ModelName | None, source: Source,
 
 
 def _gathered(
-    result: Path, output: Path, model: ModelName | None, source: Source, *, reduced: bool, is_drawn: bool
+    result: Path,
+    output: Path,
+    model: ModelName | None,
+    source: Source,
+    work: WorkOptions,
+    *,
+    reduced: bool,
+    is_drawn: bool,
 ) -> "Gathered":
     from handeye.report import gather_recording, gather_result  # noqa: PLC0415
 
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     words = ["handeye", "report", str(result)]
     if result.suffix.lower() == ".json" and not result.is_dir():
-        if source != Source() or model is not None or reduced or is_drawn:
+        if (source, work) != (Source(), WorkOptions()) or model is not None or reduced or is_drawn:
             raise UsageError(
                 "a result is solved already", hint="leave out the options for folders, or give the folder"
             )
         return gather_result(result, command=shlex.join([*words, "--output", str(output)]), made=made)
-    words += _source_words(source)
+    words += [*_source_words(source), *work_words(work.work())]
     if model is not None:
         words += ["--model", model.value]
     if reduced:
@@ -124,6 +135,7 @@ def _gathered(
         reduced=reduced,
         made=made,
         is_drawn=is_drawn,
+        work=work.work(),
     )
 
 

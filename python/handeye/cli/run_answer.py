@@ -15,7 +15,6 @@ from handeye.session.deciding import EndReason
 from handeye.session.loop import End
 from handeye.session.prepared import Prepared
 from handeye.session.settings import Configuration
-from handeye.types.calibration import ModelName
 from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ def run_answer(folder: Path, configuration: Configuration, prepared: Prepared, e
     HandeyeError
         As `found`.
     """
-    report = None if end.calibration is None else _report(folder, configuration.model)
+    report = None if end.calibration is None else _report(folder, configuration)
     calibration = found(end.calibration, (end.reason, end.sentence), folder, "views")
     error: dict[str, float] | None = None
     if prepared.truth is not None and prepared.truth.X is not None:
@@ -90,8 +89,8 @@ def judged_by(prepared: Prepared) -> str:
     return "by the shapes of the links in the description"
 
 
-def _report(folder: Path, model: ModelName) -> Path | None:
-    report, trouble = report_of_session(folder, model)
+def _report(folder: Path, configuration: Configuration) -> Path | None:
+    report, trouble = report_of_session(folder, configuration.model, configuration.work)
     if trouble:
         print(f"warning: {trouble}", file=sys.stderr, flush=True)
     return report

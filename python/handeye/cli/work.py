@@ -51,6 +51,19 @@ class WorkOptions:
         return Work(box, (x, y, z), self.depth)
 
 
+def work_words(work: Work) -> list[str]:
+    """Return the options that say what is not as usual."""
+    words: list[str] = []
+    if work.box is not None:
+        corners = (*work.box.lower_m, *work.box.upper_m)
+        words += ["--work-box-mm", *(f"{value * MM_PER_M:.10g}" for value in corners)]
+    if work.tool_m != USUAL_TOOL_M:
+        words += ["--tool-mm", *(f"{value * MM_PER_M:.10g}" for value in work.tool_m)]
+    if work.depth is not Depth.SIZE:
+        words += ["--depth", work.depth.value]
+    return words
+
+
 def check_touch(touch_mm: float | None) -> None:
     """Refuse a request that nothing can meet.
 

@@ -1,20 +1,20 @@
-"""The log of checks: one line of JSON for each, and the night from which on something had moved."""
+"""The log of checks: one line of JSON for each."""
 
 import json
-import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
+import numpy as np
 
 from handeye.codes import Code
 from handeye.datasets.reading import read_text
 from handeye.errors import InputError, OutputError
 
 MAX_BYTES = 16 * 1024 * 1024
-# Sum of log-likelihood ratios that names a night (Page 1954): a thousand to one.
-NAMED = math.log(1000.0)
+# An arm that was sent to the same pose again is no farther from it.
+SAME_M, SAME_RAD = 0.005, 0.02
+Row = Annotated[tuple[float, ...], msgspec.Meta(min_length=12, max_length=12)]
 
 
 class LoggedCheck(msgspec.Struct, frozen=True):
@@ -26,26 +26,20 @@ class LoggedCheck(msgspec.Struct, frozen=True):
         When it was made, ISO 8601.
     p_value, moved
         As the check said.
-    score
-        Logarithm of the likelihood ratio of the likeliest shift over none, less the penalty for what it may
-        choose: below zero on average while nothing has moved, above it afterwards.
     sentence
         In words.
+    misfit
+        What the views miss by: `handeye.estimation.shift.Check`.
+    flanges
+        Upper three rows of the reported pose of each view, row by row, metres.
     """
 
     time: str
     p_value: float
     moved: str
-    score: float
     sentence: str
-
-
-@dataclass(frozen=True)
-class Change:
-    """From which check on something had moved, if anything: its number from 0 on, and the sum of scores."""
-
-    first: int | None
-    score: float
+    misfit: tuple[float, ...] = ()
+    flanges: tuple[Row, ...] = ()
 
 
 def read_check_log(path: Path) -> list[LoggedCheck]:
@@ -90,15 +84,34 @@ def append_check(path: Path, check: LoggedCheck) -> None:
         raise OutputError(f"{path}: {error}") from error
 
 
-def change_of(scores: list[float]) -> Change:
-    """Return from which check on something had moved (Page, Biometrika 41, 1954).
+def alike(checks: list[LoggedCheck]) -> list[int]:
+    """Return the numbers, from 0 on, of the checks that were made where the last one was.
 
-    The start of the sum of scores up to the last check that is largest; None where it is not large enough, or
-    the last checks speak against it.
+    From other places the same error of a calibration looks another way: such checks cannot be compared.
+
+    Parameters
+    ----------
+    checks
+        In their time order.
+
+    Returns
+    -------
+    list of int
+        The last always among them.
+
+    Examples
+    --------
+    >>> alike(read_check_log(Path("nights.jsonl")))
+    [0, 1, 2]
     """
-    best, total, first = -math.inf, 0.0, None
-    for number in range(len(scores) - 1, -1, -1):
-        total += scores[number]
-        if total > best:
-            best, first = total, number
-    return Change(first if best > NAMED else None, max(best, 0.0))
+    if not checks:
+        return []
+    last = np.array(checks[-1].flanges)
+
+    def same(check: LoggedCheck) -> bool:
+        if len(check.flanges) != len(last) or len(check.misfit) != len(checks[-1].misfit):
+            return False
+        off = np.abs(np.array(check.flanges) - last).reshape(-1, 3, 4)
+        return bool((off[:, :, 3] < SAME_M).all() and (off[:, :, :3] < SAME_RAD).all())
+
+    return [number for number, check in enumerate(checks) if same(check)]

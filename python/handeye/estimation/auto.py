@@ -37,7 +37,8 @@ class AutoOptions:
     probing
         Points that were touched.
     play
-        Whether the joints have play, and came to every view straight from the one before.
+        Whether the joints have play, and came to every view straight from the one before. Of an arm that
+        turns out to be rough that is looked for in any case.
 
     Examples
     --------

@@ -38,7 +38,7 @@ MOST_CAMERAS = 4
 # Noise of a rotation or joint that arms in good order do not have, and about what they have at most.
 ROUGH_RAD, USUAL_NOISE_RAD = float(np.deg2rad(0.15)), float(np.deg2rad(0.03))
 # Where the arm is not described part of what hides shows as noise; by `handeye study cheap-arms`.
-NOT_DESCRIBED_POWER = 0.55
+NOT_DESCRIBED_POWER = 0.65
 # Components of the error whose constants belong to the arm.
 OF_ARM = frozenset({"joint_offsets", "links"})
 
@@ -226,7 +226,10 @@ def fit_cell(
         measurements = measurements.with_pairs(unmirrored)
         fit = once(measurements, priors, start=_start(fit))
     rough = roughness(fit.posterior, described=arm is not None)
-    return fit if rough == 1.0 else once(measurements, priors, start=_start(fit), rough=rough)
+    if rough == 1.0:
+        return fit
+    # Such an arm has play too, most likely: as much as the views show of it.
+    return once(measurements, priors, start=_start(fit), rough=rough, play=arm is not None)
 
 
 def roughness(posterior: _core.Posterior, *, described: bool) -> float:
@@ -242,6 +245,19 @@ def roughness(posterior: _core.Posterior, *, described: bool) -> float:
     if noise <= ROUGH_RAD:
         return 1.0
     return (noise / USUAL_NOISE_RAD) ** (1.0 if described else NOT_DESCRIBED_POWER)
+
+
+def _behind(by_joint: FloatArray, joints: FloatArray) -> FloatArray:
+    """(K, 6, 2 n) twist of the flange per play of each joint, of twists per joint (K, 6, n) at joints (K, n).
+
+    A joint stands behind by half its play, on the side that it last came from. Of its side before it first
+    moves nobody knows: that is as large an error of its own, in the second half of the columns.
+    """
+    side = np.sign(np.diff(joints, axis=0, prepend=joints[:1]))
+    for k in range(1, len(side)):
+        side[k] = np.where(side[k] == 0.0, side[k - 1], side[k])
+    both = np.stack([side, side == 0.0], axis=1)
+    return -0.5 * (by_joint[:, :, np.newaxis, :] * both[:, np.newaxis]).reshape(len(joints), 6, -1)
 
 
 def _start(fit: CellFit) -> Start:
@@ -290,9 +306,7 @@ def _once(
         joints = whole.joints if touched is None else np.concatenate([whole.joints, touched.joints])
         by_joint, by_link = arm.at_flange(joints)
         if play:
-            # Behind by half the play; of the first station nobody knows.
-            moved = np.sign(np.diff(joints, axis=0, prepend=joints[:1]))
-            approach = -0.5 * by_joint * moved[:, np.newaxis, :]
+            approach = _behind(by_joint, joints)
         of_arm = (by_joint, by_link, arm.scales.tolist(), list(arm.free), list(arm.lengths))
     cameras = [
         (

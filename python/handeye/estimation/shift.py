@@ -95,6 +95,8 @@ class Check:
         Names of the views.
     detectable_mm
         Shift of the camera (root mean square over directions) that such views find in half of all cases.
+    misfit
+        What the views miss by, six numbers each, uncorrelated and of variance one if nothing has moved.
     """
 
     p_value: float
@@ -103,6 +105,7 @@ class Check:
     causes: tuple[Cause, ...]
     views: tuple[str, ...]
     detectable_mm: float
+    misfit: tuple[float, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -227,6 +230,7 @@ def check_views(estimate: Estimate, views: Measurements, alarm: float = ALARM) -
         tuple(causes),
         tuple(view.name for view in views.views),
         1e3 * _detectable(onto.T @ onto),
+        tuple(whitened.tolist()),
     )
 
 

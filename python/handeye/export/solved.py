@@ -42,6 +42,32 @@ class _Open(msgspec.Struct):
     cure: str = ""
 
 
+class TouchPoint(msgspec.Struct, forbid_unknown_fields=True):
+    """A point of the box of work in the frame of the base, and within how much a touch lands there."""
+
+    point_mm: Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
+    radius_mm: float
+
+
+class Touch(msgspec.Struct, forbid_unknown_fields=True):
+    """How far off the tool lands over a box of work: radii with 95 % probability."""
+
+    mean_mm: float
+    worst_mm: float
+    worst_at_mm: Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
+    as_reported_mm: float
+    box_mm: Rows
+    box_stated: bool
+    tool_mm: Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
+    depth: str
+    limits: dict[str, float]
+    advice: str
+    out_of_reach: int
+    out_of_sight: int
+    map: Annotated[list[TouchPoint], msgspec.Meta(min_length=1, max_length=1000)]
+    probability: float = 0.95
+
+
 class Solved(msgspec.Struct):
     """What `handeye solve` writes about one camera, as far as others need it; it has more.
 
@@ -68,3 +94,4 @@ class Solved(msgspec.Struct):
     start: str = ""
     ending: str = ""
     diagnosis: list[_Finding] = []
+    touch: Touch | None = None

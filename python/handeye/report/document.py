@@ -9,6 +9,8 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
+from handeye.export.solved import Touch
+
 FORMAT = "handeye-report"
 VERSION = 1
 
@@ -175,6 +177,7 @@ class Report(Part):
     true_error: Annotated[
         Within | None, Meta(description="how far off the answer is, where a simulation knows the truth")
     ]
+    touch: Annotated[Touch | None, Meta(description="how far off the tool lands; null where nobody can say")]
     noise: NoiseLevels
     start: str
     ending: str

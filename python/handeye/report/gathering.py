@@ -13,6 +13,7 @@ from handeye.errors import InputError
 from handeye.estimation import Measurements, calibrate_examined
 from handeye.estimation.estimate import corrected
 from handeye.estimation.faults import examine
+from handeye.estimation.work import Work
 from handeye.export import EXPORTERS, Frames, Mount, Result, checked_text
 from handeye.export.result import read_result
 from handeye.export.solved import Noise, Solved
@@ -73,6 +74,7 @@ def gather_recording(
     reduced: bool = False,
     made: str | None = None,
     is_drawn: bool = False,
+    work: Work | None = None,
 ) -> Gathered:
     """Solve a recording and gather what there is to say.
 
@@ -88,6 +90,8 @@ def gather_recording(
         Time to write into it, ISO 8601; None for none.
     is_drawn
         Whether the camera's pictures are to be shown with what was found in them.
+    work
+        What is touched; None for a usual tool where the board was seen.
 
     Raises
     ------
@@ -98,7 +102,9 @@ def gather_recording(
     measurements = Measurements.of_recording(recording)
     kinematics = arm_of(opened.folder, recording, model)
     examination = examine(measurements)
-    calibration = calibrate_examined(examination, model, reduced=reduced, kinematics=kinematics)
+    calibration = calibrate_examined(
+        examination, model, reduced=reduced, kinematics=kinematics, work=work or Work()
+    )
     measurements = examination.among(measurements)
     warnings = [str(warning) for warning in opened.warnings]
     known = within(calibration.covariance, calibration.degrees_of_freedom)
@@ -212,6 +218,7 @@ def _report(
             how=noise.how,
             evidence=noise.evidence,
         ),
+        touch=solved.touch,
         start=solved.start,
         ending=solved.ending,
         rmse_px=rmse_px,

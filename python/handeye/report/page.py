@@ -12,6 +12,7 @@ from handeye.report.document import Report
 from handeye.report.gathering import Gathered
 from handeye.report.residual_pictures import Tiles, residual_tiles, scale_bar
 from handeye.report.scene_picture import cell_picture, mount_picture, views_picture
+from handeye.report.touch_picture import touch_picture
 from handeye.report.wording import figures, fixed
 from handeye.types import Pose, Target
 
@@ -35,6 +36,13 @@ _SUSPECTS = {
     "time_lag": "lag between pictures and poses",
     "camera": "error of the camera's calibration",
     "board_scale": "error of the size of the board",
+}
+_LIMITS = {
+    "camera": "the camera's parameters",
+    "hand_eye": "the hand-eye",
+    "arm": "constants of the arm",
+    "board": "the size of the board",
+    "robot_noise": "what the arm errs by each time",
 }
 _ORIGINS = {"given": "as given", "files": "from the files", "calibrated": "calibrated from these images"}
 # Beyond this the page would be too long to read; the worst are shown.
@@ -81,6 +89,9 @@ def _context(gathered: Gathered) -> dict[str, Any]:
         "target_position": "  ".join(f"{fixed(1000 * v, 2)}" for v in target.translation) + " mm",
         "target_quaternion": "  ".join(fixed(float(v), 6) for v in target.quaternion_xyzw),
         "mount": mount_picture(scene, r.answer),
+        "touch_picture": "" if r.touch is None else touch_picture(r.touch),
+        "touch_advice": "" if r.touch is None or not r.touch.advice else _sentence(r.touch.advice),
+        "limits": [] if r.touch is None else _limits(r.touch.limits),
         "cell": cell_picture(scene),
         "views_picture": views_picture(scene) if scene.flanges else "",
         "cell_caption": _cell_caption(gathered),
@@ -193,6 +204,16 @@ def _robot_sentence(r: Report) -> str:
         f"{figures(r.noise.robot_translation_mm, 2)} mm and {figures(r.noise.robot_rotation_deg, 2)} deg per "
         f"axis, {_SIDES.get(r.noise.robot_side, r.noise.robot_side)}"
     )
+
+
+def _sentence(words: str) -> str:
+    return f"{words[0].upper()}{words[1:]}."
+
+
+def _limits(limits: dict[str, float]) -> list[tuple[str, float]]:
+    return [
+        (_LIMITS.get(name, name), share) for name, share in sorted(limits.items(), key=lambda one: -one[1])
+    ]
 
 
 def _suspects(r: Report) -> list[tuple[str, str]]:

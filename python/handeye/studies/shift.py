@@ -1,5 +1,6 @@
 """Is a shift found, and named? Made-up cells: calibrated, then shifted, then checked with a few views."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -70,7 +71,7 @@ def study_shift(
     SolveError
         An estimate failed.
     """
-    kinds = [m for m in Moved if options.arm_known or m is not Moved.JOINT]
+    kinds = shifts_of(options)
     jobs = [_Job(options, moved, number) for moved in kinds for number in range(options.trials)]
     done = run_all(_one, jobs, workers=workers, progress=progress)
     result: dict[str, Any] = {}
@@ -97,39 +98,79 @@ def study_shift(
     }
 
 
-def _one(job: _Job) -> Trial:
-    options = job.options
-    mounting = list(Mounting)[job.number % 2]
-    kind = MIXTURES[job.number // 2 % len(MIXTURES)]
-    count = CALIBRATION + POSTURES
-    cell = simulate_cell(
-        kind, job.number, CellOptions(mounting=mounting, views=(count, count)), seed=options.seed
-    )
-    everything = Measurements.of_recording(cell.recording)
-    kinematics = ArmKinematics(simulated_arm()) if options.arm_known else None
-    estimate = make_estimator(ModelName.AUTO, kinematics)(everything.select(range(CALIBRATION)))
-    postures = everything.select(range(CALIBRATION, len(everything)))
-    chosen, _ = plan_check(estimate, postures.motions, postures.joints, options.views)
-    random = np.random.default_rng([options.seed, 3, job.number, list(Moved).index(job.moved)])
-    size = options.sigmas * _sigma(estimate, postures.select(chosen))
-    shifted, zeros, joint = _shifted(random, cell, job.moved, estimate, postures.select(chosen), size)
+def shifts_of(options: ShiftStudy) -> list[Moved]:
+    """Return the kinds of shift that can be looked for; zeros of joints only where the arm is described."""
+    return [moved for moved in Moved if options.arm_known or moved is not Moved.JOINT]
 
-    def look(indices: list[int]) -> Measurements:
-        views = [postures.views[i] for i in indices]
-        return Measurements.of(
-            mounting,
-            cell.recording.camera,
-            cell.recording.target,
-            [picture(random, shifted, zeros, view) for view in views],
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A cell as it stands, and the zeros of its joints (n,)."""
+
+    cell: SimulatedCell
+    zeros: FloatArray
+    postures: Measurements
+
+    def views(self, random: np.random.Generator, indices: Sequence[int]) -> Measurements:
+        """Take pictures at postures."""
+        recording = self.cell.recording
+        views = [picture(random, self.cell, self.zeros, self.postures.views[i]) for i in indices]
+        return Measurements.of(recording.mounting, recording.camera, recording.target, views)
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedCell:
+    """A cell that was calibrated, the postures a check may go to, and those that were planned."""
+
+    still: Cell
+    estimate: Estimate
+    chosen: list[int]
+    size_m: float
+
+    @classmethod
+    def draw(cls, options: ShiftStudy, number: int) -> "CheckedCell":
+        """Draw and calibrate one, and plan its check."""
+        mounting = list(Mounting)[number % 2]
+        kind = MIXTURES[number // 2 % len(MIXTURES)]
+        count = CALIBRATION + POSTURES
+        cell = simulate_cell(
+            kind, number, CellOptions(mounting=mounting, views=(count, count)), seed=options.seed
         )
+        everything = Measurements.of_recording(cell.recording)
+        kinematics = ArmKinematics(simulated_arm()) if options.arm_known else None
+        estimate = make_estimator(ModelName.AUTO, kinematics)(everything.select(range(CALIBRATION)))
+        postures = everything.select(range(CALIBRATION, len(everything)))
+        chosen, _ = plan_check(estimate, postures.motions, postures.joints, options.views)
+        size = options.sigmas * _sigma(estimate, postures.select(chosen))
+        return cls(Cell(cell, np.zeros(len(simulated_arm())), postures), estimate, chosen, size)
 
-    check = check_views(estimate, look(chosen))
-    named = check.moved is job.moved and (not joint or check.causes[0].joint == joint)
+    def shifted(self, random: np.random.Generator, moved: Moved) -> "Shifted":
+        """Shift something in it."""
+        views = self.still.postures.select(self.chosen)
+        cell, zeros, joint = _shifted(random, self.still.cell, moved, self.estimate, views, self.size_m)
+        return Shifted(cell, zeros, self.still.postures, joint)
+
+
+@dataclass(frozen=True, eq=False)
+class Shifted(Cell):
+    """A cell after a shift, and the joint that moved, if it was one."""
+
+    joint: str
+
+
+def _one(job: _Job) -> Trial:
+    checked = CheckedCell.draw(job.options, job.number)
+    random = np.random.default_rng([job.options.seed, 3, job.number, list(Moved).index(job.moved)])
+    shifted = checked.shifted(random, job.moved)
+    check = check_views(checked.estimate, shifted.views(random, checked.chosen))
+    named = check.moved is job.moved and (not shifted.joint or check.causes[0].joint == shifted.joint)
     alarms = [
-        check_views(estimate, look([int(i) for i in random.permutation(len(postures))[:count]])).alarm
+        check_views(
+            checked.estimate, shifted.views(random, random.permutation(POSTURES)[:count].tolist())
+        ).alarm
         for count in RANDOM_VIEWS
     ]
-    return Trial(check.alarm, named, tuple(alarms), 1e3 * size)
+    return Trial(check.alarm, named, tuple(alarms), 1e3 * checked.size_m)
 
 
 def _sigma(estimate: Estimate, views: Measurements) -> float:

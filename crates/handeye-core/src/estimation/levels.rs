@@ -23,6 +23,13 @@ pub enum LevelPrior {
         /// Deviation of its logarithm.
         spread: f64,
     },
+    /// A deviation that is roughly known: log-normal about its start.
+    Known {
+        /// Deviation of its logarithm.
+        spread: f64,
+        /// Below this it would be as good as nothing.
+        nothing: f64,
+    },
 }
 
 /// A level of the error.
@@ -41,11 +48,29 @@ const LEAST: f64 = 0.05;
 /// How sharply a level ends where it is nothing, in its logarithm.
 const WALL: f64 = 0.5;
 
+/// How surely the constants of a rough arm that is described are about as large as its noise.
+const ROUGH_SPREAD: f64 = 0.7;
+/// Metres or radians that are as good as none in an arm that misses by a tenth of a degree.
+const NOTHING: f64 = 1e-7;
+
 impl Level {
+    /// Of a constant of an arm: where to begin and what is believed if the arm is like others, and how large it is in one
+    /// that is rough, per roughness. How rough that is its noise shows, and constants are in proportion.
+    pub(super) fn of_arm(name: &'static str, roughness: f64, usual: (f64, LevelPrior), rough: f64) -> Self {
+        if roughness > 1.0 {
+            return Self {
+                name,
+                start: rough * roughness,
+                prior: LevelPrior::Known { spread: ROUGH_SPREAD, nothing: NOTHING },
+            };
+        }
+        Self { name, start: usual.0, prior: usual.1 }
+    }
+
     /// The level at which its component is as good as absent.
     pub(super) fn nothing(&self) -> f64 {
         match self.prior {
-            LevelPrior::Deviation { nothing, .. } => nothing,
+            LevelPrior::Deviation { nothing, .. } | LevelPrior::Known { nothing, .. } => nothing,
             LevelPrior::Ratio { .. } => self.start,
         }
     }
@@ -53,7 +78,7 @@ impl Level {
     /// Minus the logarithm of the prior density of the logarithm `t`, its slope and its curvature.
     pub(super) fn penalty(&self, t: f64) -> (f64, f64, f64) {
         match self.prior {
-            LevelPrior::Ratio { spread } => {
+            LevelPrior::Ratio { spread } | LevelPrior::Known { spread, .. } => {
                 let z = (t - self.start.ln()) / spread;
                 (0.5 * z * z, z / spread, spread.powi(-2))
             }

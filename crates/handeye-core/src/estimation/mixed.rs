@@ -202,7 +202,7 @@ impl Mixed {
     pub fn large_start(&self) -> DVector<f64> {
         let large = |l: &Level| match l.prior {
             LevelPrior::Deviation { size, .. } => size.ln(),
-            LevelPrior::Ratio { .. } => l.start.ln(),
+            LevelPrior::Ratio { .. } | LevelPrior::Known { .. } => l.start.ln(),
         };
         DVector::from_iterator(self.levels.len(), self.levels.iter().map(large))
     }

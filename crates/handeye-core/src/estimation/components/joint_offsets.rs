@@ -27,16 +27,9 @@ impl Component for JointOffsets {
 
     fn levels(&self) -> Vec<Level> {
         let degree = 1_f64.to_radians();
-        vec![Level {
-            name: "offset_rad",
-            start: 0.01 * degree * self.roughness,
-            prior: LevelPrior::Deviation {
-                size: 0.07 * degree * self.roughness,
-                exponent: 0.35,
-                tail: 1.0,
-                nothing: 1e-6 * degree,
-            },
-        }]
+        let of_usual =
+            LevelPrior::Deviation { size: 0.07 * degree, exponent: 0.35, tail: 1.0, nothing: 1e-6 * degree };
+        vec![Level::of_arm("offset_rad", self.roughness, (0.01 * degree, of_usual), 0.03 * degree)]
     }
 
     fn terms(&self, _: &Cell, linearisation: &Linearisation) -> Vec<Term> {

@@ -28,27 +28,15 @@ impl Component for Links {
 
     fn levels(&self) -> Vec<Level> {
         let degree = 1_f64.to_radians();
+        let usual = |size, nothing| LevelPrior::Deviation { size, exponent: 0.6, tail: 1.0, nothing };
         vec![
-            Level {
-                name: "link_m",
-                start: 1e-4 * self.roughness,
-                prior: LevelPrior::Deviation {
-                    size: 7e-4 * self.roughness,
-                    exponent: 0.6,
-                    tail: 1.0,
-                    nothing: 1e-8,
-                },
-            },
-            Level {
-                name: "link_rad",
-                start: 0.005 * degree * self.roughness,
-                prior: LevelPrior::Deviation {
-                    size: 0.04 * degree * self.roughness,
-                    exponent: 0.6,
-                    tail: 1.0,
-                    nothing: 1e-6 * degree,
-                },
-            },
+            Level::of_arm("link_m", self.roughness, (1e-4, usual(7e-4, 1e-8)), 5e-5),
+            Level::of_arm(
+                "link_rad",
+                self.roughness,
+                (0.005 * degree, usual(0.04 * degree, 1e-6 * degree)),
+                0.03 * degree,
+            ),
         ]
     }
 

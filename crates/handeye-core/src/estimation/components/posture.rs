@@ -36,6 +36,9 @@ const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, expone
 /// would tell what is the detector's, are not there.
 const AT_FLANGE_UNSEEN: Beliefs = Beliefs { size_deg: 0.16, ..AT_FLANGE };
 const AT_BASE_UNSEEN: Beliefs = Beliefs { size_deg: 0.08, ..AT_BASE };
+/// How surely a rough arm hides errors in proportion to its noise, and the lever of arms as rough: they are small.
+const ROUGH_SPREAD: f64 = 0.4;
+const ROUGH_LEVER_M: f64 = 0.6;
 /// Functions that carry less of the variance than this count as each station's own.
 const SMALLEST_FUNCTION: f64 = 1e-4;
 /// So do all but the largest: where stations have little in common there are as many functions as stations, and each
@@ -124,23 +127,20 @@ impl Component for Posture {
 
     fn levels(&self) -> Vec<Level> {
         let degree = 1_f64.to_radians();
-        vec![
+        let (size, nothing) = (self.beliefs.size_deg * degree, 1e-6 * degree);
+        let rough = self.roughness > 1.0;
+        let level = if rough {
             Level {
                 name: self.levels[0],
-                start: 0.006 * degree * self.roughness,
-                prior: LevelPrior::Deviation {
-                    size: self.beliefs.size_deg * degree * self.roughness,
-                    exponent: self.beliefs.exponent,
-                    tail: 2.0,
-                    nothing: 1e-6 * degree,
-                },
-            },
-            Level {
-                name: self.levels[1],
-                start: self.beliefs.lever_m,
-                prior: LevelPrior::Ratio { spread: 0.7 },
-            },
-        ]
+                start: size * self.roughness,
+                prior: LevelPrior::Known { spread: ROUGH_SPREAD, nothing },
+            }
+        } else {
+            let prior = LevelPrior::Deviation { size, exponent: self.beliefs.exponent, tail: 2.0, nothing };
+            Level { name: self.levels[0], start: 0.006 * degree, prior }
+        };
+        let lever_m = if rough { self.beliefs.lever_m.min(ROUGH_LEVER_M) } else { self.beliefs.lever_m };
+        vec![level, Level { name: self.levels[1], start: lever_m, prior: LevelPrior::Ratio { spread: 0.7 } }]
     }
 
     fn terms(&self, _: &Cell, linearisation: &Linearisation) -> Vec<Term> {
