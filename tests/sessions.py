@@ -21,7 +21,7 @@ from handeye.session.rig_store import open_rig_session
 from handeye.session.settings import Configuration, RigSettings, Simulation
 from handeye.session.store import is_session, open_session
 from handeye.studies.rig_cell import rig_cell
-from handeye.types import Recording, RigRecording
+from handeye.types import Recording, RigRecording, Target
 
 QUICK = Configuration("epson_c4l", simulation=Simulation(points_only=0.1))
 
@@ -44,12 +44,12 @@ def attempt(cell: Cell, goal: Goal, digests: frozenset[str] = frozenset()) -> Se
     return look(cell, cell.eyes[0], goal.label, digests, {}, None)
 
 
-def run(configuration: Configuration, folder: Path) -> End:
+def run(configuration: Configuration, folder: Path, target: Target | None = None) -> End:
     """Run to the end, from the beginning or from where it broke off."""
     if is_session(folder):
         session, store, _ = go_on(folder)
     else:
-        session, store = begin(prepare(configuration), folder)
+        session, store = begin(prepare(configuration, target=target), folder)
     try:
         return session.run()
     finally:

@@ -19,7 +19,7 @@ from handeye.cli.page import Page, serve, show_views
 from handeye.cli.plan_rig import plan_rig
 from handeye.cli.plan_together import Together, check_together, choose_together, show_together, together_data
 from handeye.cli.source import Source, mindful_of
-from handeye.cli.work import WorkOptions, check_touch, touch_lines
+from handeye.cli.work import WorkOptions, check_touch, height_of, touch_lines
 from handeye.codes import Code
 from handeye.datasets import read_poses
 from handeye.errors import InputError
@@ -82,6 +82,7 @@ def plan(
     criterion: Criterion | None = None,
     tool_point_mm: tuple[float, float, float] | None = None,
     touch_mm: float | None = None,
+    height_mm: tuple[float, float] | None = None,
     model: ModelName = ModelName.AUTO,
     top: int | None = None,
     together: int | None = None,
@@ -121,6 +122,10 @@ def plan(
         That point, in the camera frame: x y z.
     touch_mm
         Say whether a touch lands within so much with 95 % probability already, wherever in the box of work.
+    height_mm
+        Height of the middle of the target in the frame that it is fixed to (base, or flange with the camera
+        beside the robot), and how well it is known: for an arm that turns about one axis only, such as SCARA
+        and gantry, which cannot tell it.
     model
         auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact.
     top
@@ -179,7 +184,7 @@ def plan(
     with mindful_of(warnings):
         start = measurements.select([names.index(name) for name in taken])
         kinematics = arm.kinematics(opened.recording.views, model)
-        estimate = make_estimator(model, kinematics)(start)
+        estimate = make_estimator(model, kinematics, height=height_of(height_mm, model))(start)
         here = work.work()
         known = touch_where_possible(estimate, start, here)
         worth = _criterion(criterion, tool_point_mm, estimate, start, here)

@@ -16,7 +16,7 @@ from handeye.cli.page import Live, Page
 from handeye.cli.run_answer import judged_by, run_answer
 from handeye.cli.run_options import Lens, Limits, Rig, Simulated, TimeoutOptions
 from handeye.cli.run_rig import check_rig, resume_rig, run_rig
-from handeye.cli.work import WorkOptions, check_touch
+from handeye.cli.work import WorkOptions, check_touch, height_of
 from handeye.datasets import read_camera, read_target
 from handeye.estimation import Estimate
 from handeye.notations import SHOWN
@@ -60,6 +60,7 @@ def run(
     accuracy_mm: float = 0.5,
     accuracy_deg: float = 0.05,
     touch_mm: float | None = None,
+    height_mm: tuple[float, float] | None = None,
     max_views: int = 20,
     seed: Seed = 0,
     model: ModelName = ModelName.AUTO,
@@ -110,6 +111,10 @@ def run(
     touch_mm
         Instead of both: stop when a touch lands within so much with 95 % probability, wherever in the box of
         work, and choose views for it.
+    height_mm
+        Height of the middle of the target in the frame that it is fixed to (base, or flange with the camera
+        beside the robot), and how well it is known: for an arm that turns about one axis only, such as SCARA
+        and gantry, which cannot tell it.
     max_views
         Stop at so many views in any case.
     seed
@@ -177,6 +182,7 @@ def run(
         simulation=simulated.simulation(),
         touch_mm=touch_mm,
         work=work.work(),
+        height=height_of(height_mm, model),
         rig=several.settings(),
         anyway=anyway,
     )

@@ -15,7 +15,7 @@ from handeye.cli.page import Page, serve, show_views
 from handeye.cli.solve_poses import answer_for_poses
 from handeye.cli.solve_rig import answer_for_rig
 from handeye.cli.source import Source, mindful_of
-from handeye.cli.work import WorkOptions, touch_lines
+from handeye.cli.work import WorkOptions, height_of, touch_lines
 from handeye.datasets import PosePairs
 from handeye.datasets.touches import read_touches
 from handeye.estimation import Measurements, make_estimator
@@ -40,6 +40,7 @@ def solve(
     camera_fixed: bool = False,
     certify: bool = False,
     touches: Path | None = None,
+    height_mm: tuple[float, float] | None = None,
     output: Path | None = None,
     source: Source = Source(),  # noqa: B008 - frozen
     arm: ArmSource = ArmSource(),  # noqa: B008 - frozen
@@ -69,13 +70,17 @@ def solve(
         Bound from below how well any other answer could fit the poses, and say whether this is the best.
     touches
         Points that were touched, as measurements beside the pictures: the file of `handeye verify`.
+    height_mm
+        Height of the middle of the target in the frame that it is fixed to (base, or flange with the camera
+        beside the robot), and how well it is known: for an arm that turns about one axis only, such as SCARA
+        and gantry, which cannot tell it.
     output
         Also write the JSON object to this file.
     """
     check_output(output)
     if source.only is None and is_rig(folder):
-        if touches is not None:
-            raise UsageError("--touches takes one camera", hint="leave it out for several")
+        if touches is not None or height_mm is not None:
+            raise UsageError("--touches and --height-mm take one camera", hint="leave them out for several")
         rig = source.open_rig(folder)
         views = [station.views[0].view for station in rig.recording.stations]
         return answer_for_rig(
@@ -102,6 +107,7 @@ def solve(
             camera_fixed=camera_fixed,
             work=work.work(),
             probing=None if touches is None else read_touches(touches),
+            height=height_of(height_mm, model),
         )
     region = position_region(calibration)
     data = _data(opened, calibration, region)

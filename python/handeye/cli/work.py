@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError
+from handeye.estimation.height import Height
 from handeye.estimation.touch import Depth
 from handeye.estimation.work import USUAL_TOOL_M, Work
+from handeye.types.calibration import ModelName
 from handeye.types.touch import TouchMap, WorkBox
 from handeye.types.units import MM_PER_M
 
@@ -49,6 +51,24 @@ class WorkOptions:
         x, y, z = (value / MM_PER_M for value in self.tool_mm)
         box = None if self.work_box_mm is None else WorkBox.of_mm(self.work_box_mm)
         return Work(box, (x, y, z), self.depth)
+
+
+def height_of(height_mm: tuple[float, float] | None, model: ModelName) -> Height | None:
+    """Return a height as the library takes it.
+
+    Raises
+    ------
+    UsageError
+        The paper's model, which has no place for it.
+    InputError
+        A height that is no number, or known exactly.
+    """
+    if height_mm is None:
+        return None
+    if model is ModelName.PAPER:
+        raise UsageError("the paper's model takes no height", hint="leave --model out")
+    at, sigma = height_mm
+    return Height(at / MM_PER_M, sigma / MM_PER_M)
 
 
 def work_words(work: Work) -> list[str]:

@@ -6,8 +6,9 @@ description has it on the link before: the motion of view k is truly ``exp(D_k d
 parameter with a prior; what differs is noise.
 
 An offset of the first joint moves every pose of the arm by one and the same motion of the base, and one of
-the last by the same motion of the flange: they only say where base and flange are. This gauge freedom is
-fixed by taking both as zero: `T_flange_camera` is the pose in the flange that the controller reports.
+the last by the same motion of the flange: they only say where base and flange are. So do the zeros of all
+slides of a gantry. This gauge freedom is fixed by taking them as zero: `T_flange_camera` is the pose in the
+flange that the controller reports.
 """
 
 from dataclasses import dataclass
@@ -56,7 +57,9 @@ class ArmModel:
         count = len(kinematics.joint_names)
         lengths = np.abs(kinematics.link_twists[:, :3]).sum(axis=(0, 1)) > 0
         scales = np.where(kinematics.sliding, SLIDING_M_PER_RAD, 1.0)
-        return cls(kinematics, scales, tuple(range(1, count - 1)), tuple(lengths.tolist()))
+        # Slides before all joints that turn only say where the base is, as a first joint that turns does.
+        leading = next((i for i, slides in enumerate(kinematics.sliding) if not slides), count)
+        return cls(kinematics, scales, tuple(range(max(leading, 1), count - 1)), tuple(lengths.tolist()))
 
     def check(self, measurements: Measurements) -> None:
         """Raise where the views do not have the joints of this arm.

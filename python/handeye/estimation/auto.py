@@ -13,6 +13,7 @@ import numpy as np
 from handeye.estimation.attribution import Levels, arm_constants, attribution, noise_of
 from handeye.estimation.cell_fit import CellFit, fit_cell
 from handeye.estimation.estimate import Estimate
+from handeye.estimation.height import Height, with_height
 from handeye.estimation.initialize import check_views
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.observability import undetermined
@@ -39,6 +40,8 @@ class AutoOptions:
     play
         Whether the joints have play, and came to every view straight from the one before. Of an arm that
         turns out to be rough that is looked for in any case.
+    height
+        Of the target, where somebody measured it: an arm that turns about one axis only cannot tell.
 
     Examples
     --------
@@ -50,6 +53,7 @@ class AutoOptions:
     camera_fixed: bool = False
     probing: Probing | None = None
     play: bool = False
+    height: Height | None = None
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,8 @@ class AutoEstimator:
         used = fit.measurements.pairs[CAMERA, TARGET]
         noise = noise_of(fit.posterior, fit.measurements.whole, fit.arm, fit.pixels[CAMERA, TARGET].sigma_px)
         unobservable = undetermined(used, fit.X[CAMERA], fit.Y[TARGET], noise)
-        return estimate_of(fit, CAMERA, TARGET, noise, unobservable, attribution_of(fit, noise))
+        estimate = estimate_of(fit, CAMERA, TARGET, noise, unobservable, attribution_of(fit, noise))
+        return estimate if self.options.height is None else with_height(estimate, self.options.height)
 
 
 def attribution_of(fit: CellFit, noise: Noise) -> Finding:

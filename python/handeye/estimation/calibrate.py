@@ -8,6 +8,7 @@ from handeye.errors import DegenerateError
 from handeye.estimation.auto import AutoEstimator, AutoOptions
 from handeye.estimation.estimate import Estimate, Estimator, regular_information
 from handeye.estimation.faults import Examination, examine, measured
+from handeye.estimation.height import Height
 from handeye.estimation.initialize import check_views
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.paper import paper_estimate
@@ -32,6 +33,7 @@ def make_estimator(
     *,
     camera_fixed: bool = False,
     probing: Probing | None = None,
+    height: Height | None = None,
 ) -> Estimator:
     """Return what estimates under a model's assumptions; the paper's has no use for arm or touches.
 
@@ -45,6 +47,8 @@ def make_estimator(
         Hold the camera as it is given.
     probing
         Points that were touched.
+    height
+        Of the target, for an arm that turns about one axis only.
 
     Examples
     --------
@@ -54,7 +58,7 @@ def make_estimator(
     """
     if ModelName(model) is ModelName.PAPER:
         return paper_estimate
-    return AutoEstimator(AutoOptions(kinematics, camera_fixed, probing))
+    return AutoEstimator(AutoOptions(kinematics, camera_fixed, probing, height=height))
 
 
 def solve(
@@ -66,6 +70,7 @@ def solve(
     camera_fixed: bool = False,
     work: Work | None = None,
     probing: Probing | None = None,
+    height: Height | None = None,
 ) -> Calibration:
     """Calibrate from all usable views of a recording.
 
@@ -90,6 +95,8 @@ def solve(
         was seen.
     probing
         Points that were touched, as measurements beside the pictures.
+    height
+        Of the target, as measured: what an arm that turns about one axis only cannot tell.
 
     Raises
     ------
@@ -119,6 +126,7 @@ def solve(
         camera_fixed=camera_fixed,
         work=work,
         probing=probing,
+        height=height,
     )
 
 
@@ -131,6 +139,7 @@ def calibrate(
     camera_fixed: bool = False,
     work: Work | None = None,
     probing: Probing | None = None,
+    height: Height | None = None,
 ) -> Calibration:
     """Calibrate from measurements; see `solve`.
 
@@ -150,6 +159,8 @@ def calibrate(
         What is touched, for the touch error.
     probing
         Points that were touched.
+    height
+        Of the target.
 
     Raises
     ------
@@ -170,6 +181,7 @@ def calibrate(
         camera_fixed=camera_fixed,
         work=work,
         probing=probing,
+        height=height,
     )
 
 
@@ -182,6 +194,7 @@ def calibrate_examined(
     camera_fixed: bool = False,
     work: Work | None = None,
     probing: Probing | None = None,
+    height: Height | None = None,
 ) -> Calibration:
     """Calibrate from measurements whose mistakes have been looked for; see `solve`.
 
@@ -189,7 +202,7 @@ def calibrate_examined(
     ----------
     examination
         Measurements without those that are wrong, and what was found.
-    model, reduced, kinematics, camera_fixed, work, probing
+    model, reduced, kinematics, camera_fixed, work, probing, height
         As for `calibrate`.
 
     Raises
@@ -205,7 +218,9 @@ def calibrate_examined(
     """
     measurements = examination.measurements
     check_views(measurements)
-    estimate = make_estimator(model, kinematics, camera_fixed=camera_fixed, probing=probing)(measurements)
+    estimate = make_estimator(model, kinematics, camera_fixed=camera_fixed, probing=probing, height=height)(
+        measurements
+    )
     if not reduced:
         require_determined(estimate)
     calibration = examination.told(to_calibration(measurements, estimate))

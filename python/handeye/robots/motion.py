@@ -91,8 +91,8 @@ class ArmKinematics:
     def link_twists(self) -> FloatArray:
         """(n, 6, m) twist of each joint on the link before it, per way of displacing it.
 
-        Where the first joint sits says where the base is, and the place and angle of the last along its own
-        axis where the flange is: matters of names, and left out.
+        Where the first joint sits says where the base is, as does the place of joints behind slides alone, and
+        the place and angle of the last along its own axis where the flange is: gauge freedom, left out.
         """
         return self._link_twists
 
@@ -103,7 +103,9 @@ class ArmKinematics:
         for i in range(1, count):
             axis = np.array(self.arm.joints[i].axis)
             along, *across = np.linalg.svd(axis[np.newaxis])[2]
-            for first in (0, 3):
+            # Behind slides alone a joint sits elsewhere as the base does.
+            behind_slides = all(self.arm.sliding[:i])
+            for first in (3,) if behind_slides else (0, 3):
                 for direction in across if i == count - 1 else (*across, along):
                     way = np.zeros((count, 6))
                     way[i, first : first + 3] = direction

@@ -87,7 +87,7 @@ class Session(Stepping[Situation, End]):
         self._wish = wish
         known = wish.joints_err and wish.model is ModelName.AUTO
         self._kinematics = chooser.kinematics if known else None
-        self._estimator: Estimator = make_estimator(wish.model, self._kinematics)
+        self._estimator: Estimator = make_estimator(wish.model, self._kinematics, height=wish.height)
         # Where no camera was given there is none until the views teach one.
         self._learning = store.self_calibration
         self._measurements = self._no_measurements()
@@ -207,7 +207,9 @@ class Session(Stepping[Situation, End]):
                 return End(reason, f"{sentence}; {error.message}", None, None, len(views), len(entries))
             estimate = self._estimator(examination.measurements)
             if estimate.determined:
-                calibration = calibrate_examined(examination, self._wish.model, kinematics=self._kinematics)
+                calibration = calibrate_examined(
+                    examination, self._wish.model, kinematics=self._kinematics, height=self._wish.height
+                )
                 radii = estimate.within_95
                 lens_px = None if self._learning is None else lens_within_px(estimate)
         return End(reason, sentence, calibration, radii, len(views), len(entries), estimate, lens_px)

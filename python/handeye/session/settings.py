@@ -11,6 +11,7 @@ import numpy as np
 
 from handeye.codes import Code
 from handeye.errors import InputError
+from handeye.estimation.height import Height
 from handeye.estimation.work import Work
 from handeye.planning.collisions import Workspace
 from handeye.planning.constraints import ViewLimits
@@ -94,6 +95,8 @@ class Configuration:
         How well such a camera is to be known, see `Wish`.
     touch_mm, work
         Touch error to reach in place of the accuracy, and what is seen and touched.
+    height
+        Of the target, as measured, for an arm that turns about one axis only.
     rig
         What there is to say of several cameras; None for one.
     anyway
@@ -128,6 +131,7 @@ class Configuration:
     work: Work = field(default_factory=Work)
     rig: RigSettings | None = None
     anyway: bool = False
+    height: Height | None = None
 
     @property
     def is_simulated(self) -> bool:
@@ -162,6 +166,7 @@ class Configuration:
             work=self.work,
             camera_to_camera=None if self.rig is None else self.rig.camera_to_camera,
             anyway=self.anyway,
+            height=self.height,
         )
 
     def workspace(self) -> Workspace:

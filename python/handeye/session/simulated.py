@@ -160,9 +160,18 @@ def _lens(name: str) -> tuple[str, tuple[float, ...]]:
     return LENSES[name]
 
 
+# Postures drawn where arms of few joints reach none that is asked for, and of how many ways are tried.
+_DRAWN, _TRIED = 4000, 200
+# Cosine of what counts as down.
+_ABOUT_DOWN = 0.97
+
+
 def surrounding(arm: Arm) -> Workspace:
-    """Return the box in front of, beside and above an arm that stands on a table."""
+    """Return the box in front of, beside and above an arm that stands on a table, or slides over it."""
     reach = arm.reach_m + 0.2
+    if any(arm.sliding):
+        ways = np.abs(arm.limits[np.array(arm.sliding)]).max(axis=1)
+        reach += float(ways[np.isfinite(ways)].sum() + np.linalg.norm(arm.joints[0].placement.translation))
     return Workspace(np.array([-reach, -reach, 0.02]), np.array([reach, reach, reach + 0.3]))
 
 
@@ -192,6 +201,17 @@ def looking_down(arm: Arm, workspace: Workspace) -> tuple[Pose, tuple[float, ...
             room = [float(np.min(np.minimum(q - low, high - q) / (high - low))) for q in free]
             best = free[int(np.argmax(room))]
             return Pose(arm.forward(best)), tuple(best.tolist())
+    drawn = np.random.default_rng(0).uniform(low, high, (_DRAWN, len(arm)))
+    flanges = arm.forward(drawn)
+    # What arms of few joints reach: the flange about down, in front and not on the table.
+    ahead, above = flanges[:, 0, 3], flanges[:, 2, 3]
+    usable = -flanges[:, 2, 2] > _ABOUT_DOWN
+    if usable.any():
+        usable &= (ahead > 0.3 * ahead[usable].max()) & (above > 0.5 * above[usable].max())
+    room = np.min(np.minimum(drawn - low, high - drawn) / (high - low), axis=1)
+    for number in np.flatnonzero(usable)[np.argsort(-room[usable])][:_TRIED]:
+        if body.obstacles(drawn[number][np.newaxis])[0] is None:
+            return Pose(flanges[number]), tuple(drawn[number].tolist())
     raise SolveError(
         f"arm {arm.name}: no posture found with the flange down in front of it",
         code=Code.NO_START,

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handeye.planning.collisions import Body
+from handeye.robots import Arm
 from handeye.types import Camera, Pose, View
 from handeye.types.arrays import FloatArray
 
@@ -29,6 +30,9 @@ _TURNS = np.array(
 MOST_VIEWS = len(_TURNS) + 1
 LARGEST_TILT_RAD, LARGEST_ROLL_RAD = 0.30, 0.35
 SMALLEST_TILT_RAD = 0.05
+# Joints that it takes to turn about any axis in place, and to tilt at all.
+WHOLE, TILTING = 6, 5
+TILT_LEVER_M = 0.4
 # Share of the room in the image that a turn may use, and by how much it shrinks where it fails.
 ROOM_SHARE, SHRINK = 0.7, 0.6
 
@@ -81,13 +85,27 @@ def starting_goal(
         return None
     arm = body.arm
     for trial in range(failures, failures + 6):
-        pose = start.T_base_flange @ Pose.exp(_turn(number, trial, tilt_rad))
-        joints, reached = arm.inverse_all(pose.matrix[np.newaxis], np.array(start.joints_rad), attempts=1)
-        if not reached[0]:
+        joints = _turned(arm, start, _turn(number, trial, tilt_rad))
+        if joints is None:
             continue
-        if standing_rad is None or body.obstacle_on_path(standing_rad, joints[0]) is None:
-            return Pose(arm.forward(joints[0])), joints[0]
+        if standing_rad is None or body.obstacle_on_path(standing_rad, joints) is None:
+            return Pose(arm.forward(joints)), joints
     return None
+
+
+def _turned(arm: Arm, start: Start, twist: FloatArray) -> FloatArray | None:
+    """Joints (n,) at which the flange is turned by a twist; with few joints, as near to that as they come."""
+    if len(arm) < TILTING:
+        # Moved across instead, about as far as the tilt would move the target in the image.
+        twist = np.array([TILT_LEVER_M * twist[4], -TILT_LEVER_M * twist[3], 0.0, 0.0, 0.0, twist[5]])
+    pose = start.T_base_flange @ Pose.exp(twist)
+    joints, reached = arm.inverse_all(pose.matrix[np.newaxis], np.array(start.joints_rad), attempts=1)
+    if reached[0]:
+        return joints[0]
+    if len(arm) >= WHOLE:
+        return None
+    turned = start.T_base_flange.inverse() @ Pose(arm.forward(joints[0]))
+    return joints[0] if turned.rotation_angle_rad > SMALLEST_TILT_RAD else None
 
 
 def preview(start: Start, body: Body, count: int) -> list[tuple[Pose, FloatArray]]:
@@ -96,10 +114,9 @@ def preview(start: Start, body: Body, count: int) -> list[tuple[Pose, FloatArray
     arm = body.arm
     for number in range(1, count):
         for trial in range(6):
-            pose = start.T_base_flange @ Pose.exp(_turn(number, trial, LARGEST_TILT_RAD))
-            joints, reached = arm.inverse_all(pose.matrix[np.newaxis], np.array(start.joints_rad), attempts=1)
-            if reached[0] and body.obstacle_on_path(start.joints_rad, joints[0]) is None:
-                found.append((pose, joints[0]))
+            joints = _turned(arm, start, _turn(number, trial, LARGEST_TILT_RAD))
+            if joints is not None and body.obstacle_on_path(start.joints_rad, joints) is None:
+                found.append((Pose(arm.forward(joints)), joints))
                 break
     return found
 

@@ -6,6 +6,7 @@ from handeye import _core
 from handeye.codes import Code
 from handeye.errors import InputError
 from handeye.estimation import Estimate, Measurements
+from handeye.estimation.height import Height
 from handeye.estimation.work import Work
 from handeye.planning.policies import Policy
 from handeye.planning.policies.next_best_view import NextBestView
@@ -40,6 +41,8 @@ class Wish:
         Touch error to reach over the place of work, in place of the accuracy; None for none.
     work
         What is seen and touched.
+    height
+        Of the target, as measured, for an arm that turns about one axis only.
     refine
         Climb from the best candidates to better ones near them, rather than take the best that was drawn.
     camera_to_camera
@@ -76,6 +79,7 @@ class Wish:
     touch_mm: float | None = None
     work: Work = field(default_factory=Work)
     camera_to_camera: tuple[float, float] | None = None
+    height: Height | None = None
 
     def __post_init__(self) -> None:
         self.rules()  # checks what they check

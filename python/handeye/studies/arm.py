@@ -30,8 +30,8 @@ TOOL_M = (0.0, 0.0, 0.15)
 # Views before any are planned, and how far unseen postures are from those of the views.
 START, AWAY_RAD = 8, 0.3
 WORK_POSTURES = 100
-# Boards are off by this share: nobody knows better, and a larger arm and a larger board look much alike.
-BOARD_SCALES = (1e-4, 1e-3)
+# Boards are off by this share, what the model believes of boards: a larger arm and a larger board look alike.
+BOARD_SCALES = (2.5e-5, 5e-4)
 
 
 @dataclass(frozen=True)
