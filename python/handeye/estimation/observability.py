@@ -149,7 +149,7 @@ def _cure(measurements: Measurements, rotations: int, shifts: int) -> str:
     axis = _common_axis(measurements)
     return (
         f"all rotations share {axis}: add views turned by 20 degrees or more about an axis across it; an arm "
-        "that cannot turn that way (four axes) cannot determine it, so measure how high the target is and state it"
+        "that cannot turn that way (four axes) cannot tell it: measure how high the target is, and state it"
     )
 
 

@@ -51,6 +51,17 @@ def read_by_mujoco(urdf: str, postures: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
+def placed(name: str, kind: str, parent: str, pose: np.ndarray) -> str:
+    """A joint and the link that it carries, in URDF."""
+    x, y, z = pose[:3, 3].tolist()
+    roll, pitch, yaw = (float(angle) for angle in Pose(pose).roll_pitch_yaw_rad)
+    limit = '<limit lower="-9" upper="9" effort="0" velocity="0"/>' if kind == "prismatic" else ""
+    return (
+        f'<link name="{name}"/><joint name="to_{name}" type="{kind}"><parent link="{parent}"/><child link="{name}"/>'
+        f'<origin xyz="{x!r} {y!r} {z!r}" rpy="{roll!r} {pitch!r} {yaw!r}"/><axis xyz="0 0 1"/>{limit}</joint>'
+    )
+
+
 def postures(arm: Arm) -> np.ndarray:
     return np.random.default_rng(1).uniform(-1, 1, (10, len(arm)))
 
@@ -120,26 +131,31 @@ def test_tables_are_the_arm(arm: Arm, size: float, name: str) -> None:
         pose[axis, 3] = way
         return pose
 
-    for joints in postures(arm):
-        pose = before
-        for row, q in zip(rows, joints, strict=True):
-            slides = row["slides"] == "1"
-            screw = about(2, float(row["theta_rad"]) + (0.0 if slides else q))
-            screw = screw @ along(2, float(row["d_m"]) + (q if slides else 0.0))
-            normal = about(0, float(row["alpha_rad"])) @ along(0, float(row["a_m"]))
-            pose = pose @ (screw @ normal if name == "dh" else normal @ screw)
-        np.testing.assert_allclose(pose @ after, one.built.forward(joints), atol=1e-9)
+    # A chain of joints about or along z, as MuJoCo reads it.
+    parts, here, parent = ['<robot name="table"><link name="base"/>'], before, "base"
+    for row in rows:
+        screw = about(2, float(row["theta_rad"])) @ along(2, float(row["d_m"]))
+        normal = about(0, float(row["alpha_rad"])) @ along(0, float(row["a_m"]))
+        here = here @ (screw if name == "dh" else normal @ screw)
+        kind = "prismatic" if row["slides"] == "1" else "continuous"
+        parts.append(placed(row["joint"], kind, parent, here))
+        here, parent = normal if name == "dh" else np.eye(4), row["joint"]
+    parts.append(placed("flange", "fixed", parent, here @ after))
+    found = read_by_mujoco("".join(parts) + "</robot>", postures(arm))
+    np.testing.assert_allclose(found, one.built.forward(postures(arm)), atol=1e-9)
 
 
 def test_zeros_are_where_the_joints_truly_are_at_zero() -> None:
     arm = open_arm("epson_c4l")
     one = corrected(arm, size=0.0)
-    at_zero = arm.forward(np.zeros(6))
+    described = CorrectedArm(arm, np.zeros((6, 6)), np.zeros(6))
+    at_zero = read_by_mujoco(ARM_FORMATS["urdf"].text(described), np.zeros((1, 6)))
     patterns = {"fanuc": r"J\d = (\S+) deg", "kuka": r"A\d (\S+?)[,}]", "abb": r"(-?\d+\.\d+)"}
     for name, pattern in patterns.items():
         said = [line for line in ARM_FORMATS[name].text(one).split("\n") if line[:1] not in "!;"]
         readings = np.deg2rad([float(value) for value in re.findall(pattern, "\n".join(said))])
-        np.testing.assert_allclose(one.built.forward(readings), at_zero, atol=1e-9)
+        found = read_by_mujoco(ARM_FORMATS["urdf"].text(one), readings[np.newaxis])
+        np.testing.assert_allclose(found, at_zero, atol=1e-9)
         assert not ARM_FORMATS[name].whole
 
 
