@@ -91,8 +91,9 @@ class ArmKinematics:
     def link_twists(self) -> FloatArray:
         """(n, 6, m) twist of each joint on the link before it, per way of displacing it.
 
-        Where the first joint sits says where the base is, so does the place of joints behind slides alone, and
-        the place and angle of the last along its own axis where the flange is: gauge freedom, left out.
+        Where the first joint sits says where the base is, and so does the place of a joint behind slides
+        alone; the place and angle of the last along its own axis say where the flange is: gauge freedom, left
+        out.
         """
         return self._link_twists
 
