@@ -56,6 +56,16 @@ def test_a_session_that_computes_is_left_alone_until_the_last_telling_was_paid_f
     assert hub.wait(seen, 0) == seen | {"scene": 2}
 
 
+def test_what_is_told_while_the_session_rests_leaves_no_debt() -> None:
+    hub = Hub()
+    hub.publish("status", dict)
+    seen = hub.wait({}, 0)
+    hub.charge("status", 1000.0)
+    hub.rests(resting=False)
+    hub.publish("status", dict)
+    assert hub.wait(seen, 0) == seen | {"status": 2}
+
+
 def test_a_program_that_has_nothing_to_do_tells_at_once() -> None:
     hub = Hub()
     hub.publish("scene", dict)
@@ -75,7 +85,6 @@ def test_a_session_rests_while_it_waits_for_a_person() -> None:
     waiting = threading.Thread(target=hub.next_command, args=(None,))
     waiting.start()
     hub.publish("scene", dict)
-    hub.charge("scene", 1000.0)
     seen = hub.wait(hub.versions() | {"scene": 0}, 10.0)
     assert seen["scene"] == 1
     hub.enter(ANNE)

@@ -97,7 +97,7 @@ class Hub:
         """Say how much processor time it took to make and to send a document."""
         with self._changed:
             section = self._sections.get(name)
-            if section is not None and name not in _FREE:
+            if section is not None and name not in _FREE and not self._resting:
                 section.free_at_s = (
                     max(section.free_at_s, time.process_time()) + max(seconds, _LEAST_S) / SHARE
                 )
