@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
+from datasets.test_images import claimed_png
 from handeye.cameras.folder import SETTLED_S, WatchedFolder
 from handeye.cameras.protocol import Grey
 from handeye.datasets.images import read_image
@@ -138,3 +139,18 @@ def test_what_is_no_picture_and_a_folder_that_is_gone(tmp_path: Path) -> None:
     with pytest.raises(DeviceError) as error:
         camera.grab("view_01.1")
     assert error.value.code == "folder_gone"
+
+
+def test_files_too_large_for_a_picture_are_passed_over_unread(tmp_path: Path) -> None:
+    def sparse() -> None:
+        with (tmp_path / "huge.png").open("wb") as file:
+            file.truncate(1 << 40)
+
+    nothing(WatchedFolder(tmp_path, read_image, patience_s=1.0), sparse, why="has 1099511627776 bytes")
+
+
+def test_a_small_file_that_says_it_is_a_huge_picture_is_refused(tmp_path: Path) -> None:
+    camera = WatchedFolder(tmp_path, read_image, patience_s=5.0)
+    with pytest.raises(DeviceError, match="which no camera's picture has") as error:
+        taken(camera, lambda: claimed_png(tmp_path / "bomb.png", 16000, 16000))
+    assert error.value.code == "bad_image"

@@ -42,6 +42,11 @@ class Kept(np.ndarray):
         Frame(None, Points(np.array([0.5]), np.array([[1.0, 2.0]]))),
         Frame(None, Points(np.array([0]), np.array([[np.nan, 2.0]]))),
         Frame(None, Points(np.array([0]), np.array([1.0, 2.0]))),
+        # More than there is memory for, in few bytes.
+        Frame(np.broadcast_to(np.uint8(1), (10**6, 10**6))),
+        Frame(np.broadcast_to(np.uint8(1), (10**6, 10**6)), Points(np.arange(9), np.eye(9, 2))),
+        Frame(None, Points(np.broadcast_to(1, (10**12,)), np.broadcast_to(1.0, (10**12, 2)))),
+        Frame(None, Points(np.arange(9), np.broadcast_to(1.0, (10**12, 2)))),
     ],
 )
 def test_what_is_no_frame_is_an_error_of_the_device(answer: object) -> None:

@@ -154,3 +154,8 @@ def test_what_only_looks_like_a_reading_is_none() -> None:
     alike = SimpleNamespace(T_base_flange=Pose.identity(), joints_rad=None)
     with pytest.raises(DeviceError, match="expected Reading"):
         typed_reading(alike)
+
+
+def test_joints_without_end_are_refused_before_they_are_copied() -> None:
+    many = Reading(TURN, np.broadcast_to(0.0, (10**12,)))  # type: ignore[arg-type]
+    assert "1000000000000 joints" in complaint(many)

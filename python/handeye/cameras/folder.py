@@ -14,6 +14,8 @@ from handeye.errors import DeviceError, HandeyeError
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"})
 # A file that has not changed for so long is taken as complete.
 SETTLED_S = 0.2
+# No picture has more bytes.
+MAX_BYTES = 512 << 20
 _POLL_S = 0.05
 # Clocks of file systems count in steps of up to two seconds.
 CLOCK_STEP_S = 2.0
@@ -121,6 +123,8 @@ class WatchedFolder:
         path = self._folder / name
         if self._stems.get(path.stem, name) != name:
             return None, f"is {self._stems[path.stem]} in another format"
+        if state.size > MAX_BYTES:
+            return None, f"has {state.size} bytes, and no picture has more than {MAX_BYTES}"
         try:
             with path.open("rb") as file:
                 digest = hashlib.file_digest(file, "blake2b").digest()

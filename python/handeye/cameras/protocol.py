@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.types.arrays import FloatArray, IndexArray, finite_array, index_array
+from handeye.types.camera import MAX_PIXELS
+from handeye.types.target.base import MAX_POINTS
 
 Grey = NDArray[np.uint8]
 # Code of what a driver returned that is no picture.
@@ -87,9 +89,13 @@ def _plain(answer: Frame) -> Frame:
         if not isinstance(image, np.ndarray):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError(f"frame: image is {type(image).__name__}, expected an array of numpy")
         image = np.asarray(image)  # not one of its subclasses
+        if image.size > MAX_PIXELS:
+            raise InputError(f"frame: an image of shape {image.shape}, expected at most {MAX_PIXELS} pixels")
     if points is not None:
         if not isinstance(points, Points):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError(f"frame: points are {type(points).__name__}, expected Points")
+        if max(len(points.point_ids), len(points.pixels)) > MAX_POINTS:
+            raise InputError(f"frame: {len(points.point_ids)} points, expected at most {MAX_POINTS}")
         ids = index_array(points.point_ids, "frame: point_ids")
         pixels = finite_array(points.pixels, (len(ids), 2), "frame: pixels")
         points = Points(ids, pixels, points.labels_known is True)
@@ -101,7 +107,8 @@ class ImageSource(Protocol):
     """A camera as a driver presents it.
 
     The arm is at rest while it is asked. It raises `handeye.errors.DeviceError` where it fails. It may be
-    asked from another thread than the one that made it, and be given up while it hangs.
+    asked from another thread than the one that made it, and be given up while it hangs. A method `close`,
+    where there is one, is called once, at the end of a session.
     """
 
     def grab(self, label: str) -> Frame:

@@ -25,6 +25,7 @@ from handeye.planning.constraints import ViewLimits
 from handeye.robots import open_arm
 from handeye.robots.manual import describe
 from handeye.robots.protocol import Goal
+from handeye.session.closing import closing
 from handeye.session.configuration import begin, go_on, prepare
 from handeye.session.deciding import START_VIEWS
 from handeye.session.drivers import REPLAY, Person
@@ -204,10 +205,11 @@ def run(
         confirm=front.confirm,
         observer=front.observer,
     )
-    if dry_run or session is None:
-        return _plan(prepared)
-    loop, store = begin(prepared, session)
-    return run_answer(session, configuration, prepared, _driven(loop, store, prepared, front))
+    with closing(prepared.cell):
+        if dry_run or session is None:
+            return _plan(prepared)
+        end = _driven(*begin(prepared, session), prepared, front)
+    return run_answer(session, configuration, prepared, end)
 
 
 class _Front:
@@ -245,9 +247,11 @@ def _resumed(session: Path, confirm: bool | None, page: Page, *, as_json: bool) 
     loop, store, prepared = go_on(
         session, person=front.person, confirm=front.confirm, observer=front.observer
     )
-    if store.notice is not None:
-        front.person.tell(f"warning: {store.notice}")
-    return run_answer(session, configuration, prepared, _driven(loop, store, prepared, front))
+    with closing(prepared.cell):
+        if store.notice is not None:
+            front.person.tell(f"warning: {store.notice}")
+        end = _driven(loop, store, prepared, front)
+    return run_answer(session, configuration, prepared, end)
 
 
 def _check(configuration: Configuration, *, given: bool, dry_run: bool) -> None:

@@ -13,10 +13,9 @@ from handeye.codes import Code
 from handeye.datasets.image_header import IMAGE_SUFFIXES, image_size, size_in
 from handeye.datasets.reading import MIB, read_bytes
 from handeye.errors import InputError
+from handeye.types.camera import MAX_PIXELS
 
 MAX_BYTES = 512 * MIB
-# Twice the largest cameras of industry; decoded, one grey value each.
-MAX_PIXELS = 1 << 28
 # A camera's picture has no more pixels than this for each byte of its file. Smaller ones than `ALWAYS_PIXELS`
 # may: they cannot fill the memory.
 PIXELS_PER_BYTE, ALWAYS_PIXELS = 100, 1 << 24

@@ -54,7 +54,8 @@ class Robot(Protocol):
 
     Every method raises `handeye.errors.DeviceError` where it fails; `code="motion_refused"` says that the
     robot is well but will not go there. A driver may be asked from another thread than the one that made it,
-    never from two at once, except for `stop`.
+    never from two at once, except for `stop`. A method `close`, where there is one, is called once, at the
+    end of a session and after `stop`; nothing is asked of the driver then.
     """
 
     def move_to(self, goal: Goal) -> None:

@@ -17,6 +17,7 @@ from handeye.robots.replay import is_near
 from handeye.robots.shipped import open_arm, shipped_arms
 from handeye.types import Pose
 from handeye.types.arrays import FloatArray, finite_array
+from handeye.types.view import MAX_JOINTS
 
 # Encoders may read this far beyond a limit at which the arm stands.
 LIMIT_TOLERANCE = 1e-3
@@ -48,6 +49,8 @@ def _plain(answer: Reading) -> Reading:
     pose.inverse()  # raises where there is no matrix in it
     if joints is None:
         return Reading(pose)
+    if hasattr(joints, "__len__") and len(joints) > MAX_JOINTS:
+        raise InputError(f"{len(joints)} joints, expected at most {MAX_JOINTS}")
     return Reading(pose, tuple(finite_array(joints, (None,), "joints_rad").tolist()))
 
 

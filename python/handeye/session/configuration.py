@@ -1,6 +1,7 @@
 """The cell that follows from what was asked for: its drivers, where its arm stands, and its session."""
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +20,7 @@ from handeye.robots.replay import ReplayRobot
 from handeye.robots.shapes import read_shapes
 from handeye.session.attempt import Cell
 from handeye.session.calls import Calls
+from handeye.session.closing import close, close_all
 from handeye.session.drivers import REPLAY, Person, open_camera, open_robot, replayed_camera
 from handeye.session.entry import Entry, views_of
 from handeye.session.loop import Session
@@ -94,27 +96,35 @@ def prepare(
         )
     workspace = configuration.workspace()
     person = person or Person(_nobody, lambda _: None)
-    robot = open_robot(configuration.driver, person, arm, joints_told=_told(start))
-    source = open_camera(configuration.images, robot, person, configuration.timeouts.grab_s)
-    if camera is None:
-        camera = nominal_camera(_pictured_size(source, configuration.timeouts.grab_s), configuration.lens)
-        configuration = replace(configuration, camera_known=False)
-    cell = Cell(
-        robot,
-        source,
-        arm,
-        workspace,
-        camera,
-        target,
-        configuration.timeouts,
-        confirm,
-        solids,
-        configuration.speed_rad_s,
-        by_hand=configuration.by_hand,
-        observer=observer,
-    )
-    if start is None:
-        start = _standing(cell, arm)
+    robot_calls, camera_calls = Calls("robot"), Calls("camera")
+    with ExitStack() as failed:
+        robot = open_robot(configuration.driver, person, arm, joints_told=_told(start))
+        failed.callback(close, robot_calls, robot)
+        source = open_camera(configuration.images, robot, person, configuration.timeouts.grab_s)
+        failed.callback(close, camera_calls, source)
+        if camera is None:
+            size_px = _pictured_size(source, camera_calls, configuration.timeouts.grab_s)
+            camera = nominal_camera(size_px, configuration.lens)
+            configuration = replace(configuration, camera_known=False)
+        cell = Cell(
+            robot,
+            source,
+            arm,
+            workspace,
+            camera,
+            target,
+            configuration.timeouts,
+            confirm,
+            solids,
+            configuration.speed_rad_s,
+            by_hand=configuration.by_hand,
+            observer=observer,
+            robot_calls=robot_calls,
+            camera_calls=camera_calls,
+        )
+        if start is None:
+            start = _standing(cell, arm)
+        failed.pop_all()
     recording = Recording(f"session with {arm.name}", configuration.mounting, camera, target, ())
     return Prepared(configuration, cell, start, recording)
 
@@ -156,7 +166,8 @@ def go_on(
         A driver fails.
     """
     store = open_session(folder)
-    try:
+    with ExitStack() as failed:
+        failed.callback(store.close)
         configuration = Configuration.from_dict(store.settings.get("configuration"))
         begun = bool(views_of(store.entries)) or configuration.is_simulated
         # Before the first view the arm may be driven elsewhere, and begins from there.
@@ -171,13 +182,12 @@ def go_on(
             start=start,
             observer=observer,
         )
+        failed.callback(close_all, prepared.cell)
         check_fingerprints(store.settings, fingerprints(prepared.cell.arm, prepared.recorded))
         if prepared.hidden_arm is not None and start is not None:
             prepared.hidden_arm.place(left_at(store.entries) or start.joints_rad)
         session = prepared.session(store)
-    except BaseException:
-        store.close()
-        raise
+        failed.pop_all()
     return session, store, prepared
 
 
@@ -341,7 +351,7 @@ def _simulated(
     )
 
 
-def _pictured_size(source: ImageSource, patience_s: float) -> tuple[int, int]:
+def _pictured_size(source: ImageSource, calls: Calls, patience_s: float) -> tuple[int, int]:
     """Return width and height of the pictures, from one that is looked at for nothing else.
 
     Raises
@@ -349,7 +359,7 @@ def _pictured_size(source: ImageSource, patience_s: float) -> tuple[int, int]:
     DeviceError
         The camera does not answer, or with something else than a picture.
     """
-    frame = checked_frame(Calls("camera").run(patience_s, source.grab, "size_of_image"))
+    frame = checked_frame(calls.run(patience_s, source.grab, "size_of_image"))
     if frame.image is None:
         raise DeviceError(
             "the camera tells points without a picture, and its size is not known",

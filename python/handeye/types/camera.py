@@ -27,6 +27,8 @@ OPENCV_LENSES = frozenset({*_LENS_OF_COEFFICIENTS.values(), "kannala_brandt"})
 # OpenCV's fourteen: the twelve and the two angles of a tilted sensor.
 _TILTED = 14
 MAX_IMAGE_SIDE_PX = 100_000
+# Of one picture: twice the largest cameras of industry.
+MAX_PIXELS = 1 << 28
 
 
 class _CameraDocument(Document):

@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 
 from handeye.codes import Code
 from handeye.datasets.bags.messages import Compressed, Raw
-from handeye.datasets.images import MAX_PIXELS, decoded, eight_bits
+from handeye.datasets.images import decoded, eight_bits
 from handeye.errors import InputError
+from handeye.types.camera import MAX_PIXELS
 
 Grey = NDArray[np.uint8]
 _COLOURS = {
