@@ -122,6 +122,7 @@ READINGS: dict[str, Callable[[Reading], Any]] = {
     "infinite_joints": lambda r: Reading(r.T_base_flange, (float("inf"),) * 6),
     "huge_joints": lambda r: Reading(r.T_base_flange, (1e300,) * 6),
     "huge_whole_joints": lambda r: Reading(r.T_base_flange, (10**400,) * 6),
+    "endless_joints": lambda r: Reading(r.T_base_flange, np.broadcast_to(0.0, (10**12,))),  # type: ignore[arg-type]
     "texts": lambda r: Reading(r.T_base_flange, ("0.1",) * 6),  # type: ignore[arg-type]
     "dict_joints": lambda r: Reading(r.T_base_flange, dict(enumerate(r.joints_rad or ()))),  # type: ignore[arg-type]
     "turned_joints": lambda r: Reading(r.T_base_flange, tuple(q + 2 * np.pi for q in r.joints_rad or ())),
@@ -217,6 +218,11 @@ class Robot:
         if fault.startswith("stop_") and fault[5:] in ERRORS:
             ERRORS[fault[5:]]()
 
+    def close(self) -> None:
+        """Let go, or do not."""
+        log(event="close", concurrent=self._at_once)
+        closed(self._mode)
+
 
 def pointed(frame: Frame, change: Callable[[Any, Any], tuple[Any, Any]]) -> Frame:
     """Return a frame of points that are changed."""
@@ -251,6 +257,12 @@ FRAMES: dict[str, Callable[[Frame], Any]] = {
     "objects": lambda f: bent(f, lambda image: image[:4].astype(object)),
     "bools": lambda f: bent(f, lambda image: image > 9),
     "huge_image": lambda f: bent(f, lambda image: np.broadcast_to(np.uint8(1), (10**6, 10**6))),
+    "huge_image_of_points": lambda f: Frame(
+        np.broadcast_to(np.uint8(1), (10**6, 10**6)), pointed(f, lambda ids, xy: (ids, xy)).points
+    ),
+    "endless_points": lambda f: pointed(
+        f, lambda ids, xy: (np.broadcast_to(1, (10**12,)), np.broadcast_to(1.0, (10**12, 2)))
+    ),
     "no_pixels": lambda f: bent(f, lambda image: image[:0]),
     "one_more_axis": lambda f: bent(f, lambda image: image[:, :, np.newaxis]),
     "turned": lambda f: bent(f, lambda image: np.ascontiguousarray(np.rot90(image))),
@@ -316,7 +328,19 @@ class Camera:
             ERRORS[fault]()
         return FRAMES[fault](self._last) if fault in FRAMES else self._last
 
+    def close(self) -> None:
+        """Let go, or do not."""
+        log(event="close camera")
+        closed(self._mode)
 
+
+def closed(mode: str) -> None:
+    """Fail as the mode has it."""
+    if mode.startswith("close_") and not os.environ.get("HOSTILE_CALM"):
+        ERRORS.get(mode[6:], lambda: time.sleep(1e6))()
+
+
+CLOSING = ("close_stuck", *(f"close_{name}" for name in ("unspeakable", "own", "exit_0", "deep")))
 ROBOT_MODES = (
     *("ok", "exit_at_start", "unspeakable_at_start", "mix,1", "mix,2"),
     *("lie", "lie_half", "half", "overshoot", "ignore", "refuse", "beyond", "rewrite", "away", "much"),
@@ -325,8 +349,9 @@ ROBOT_MODES = (
     *READINGS,
     *(f"read_{name}" for name in ERRORS),
     *(f"stop_{name}" for name in ERRORS),
+    *CLOSING,
 )
-CAMERA_MODES = ("late", "again", "overwritten", "mix,1", "mix,2", *ERRORS, *FRAMES)
+CAMERA_MODES = ("late", "again", "overwritten", "mix,1", "mix,2", *ERRORS, *FRAMES, *CLOSING)
 
 
 def log(**event: object) -> None:

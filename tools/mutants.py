@@ -76,7 +76,12 @@ MUTANTS = (
     Mutant("speed passed on", CHOOSING, 'return Goal(situation.label("view"), pose, joints, self._speed_rad_s)', 'return Goal(situation.label("view"), pose, joints)', T_SAFETY),
     Mutant("speed of the slowest joint", CHOOSING, "return min([self._wish.speed_rad_s, *turning.tolist()])", "return self._wish.speed_rad_s", T_SAFETY),
     Mutant("start where it may go", "session/configuration.py", '    if why is not None:\n        raise InputError(\n            f"the arm stands', '    if False:\n        raise InputError(\n            f"the arm stands', T_SAFETY),
+    Mutant("drivers are closed", "cli/run.py", "    with closing(prepared.cell):\n        if dry_run", "    if True:\n        if dry_run", "end_to_end/test_run.py::closed"),
+    Mutant("no robot is closed that may move", "session/closing.py", "cell.robot_calls.beside(seconds, cell.robot.stop)", "pass", "session/test_closing.py"),
+    Mutant("no device is closed while a call runs", "session/closing.py", "            calls.run(seconds, call)", "            calls.beside(seconds, call)", "session/test_closing.py"),
     # What is believed.
+    Mutant("a driver's picture may fill the memory", "cameras/protocol.py", "if image.size > MAX_PIXELS:", "if False:", "cameras/test_protocol.py"),
+    Mutant("a file in the folder may be of any size", FOLDER, "if state.size > MAX_BYTES:", "if False:", T_FOLDER),
     Mutant("reading: limits", READING, "if fits and len(beyond) == 0:", "if fits:", T_READING),
     Mutant("reading: forward kinematics", READING, "fits = is_near(pose, reading.T_base_flange, AGREEMENT_M, AGREEMENT_RAD)", "fits = True", T_READING),
     Mutant("reading: number of joints", READING, "if len(joints) != len(arm):", "if len(joints) > 99:", T_READING),

@@ -6,27 +6,33 @@
 
 The drivers are those of `hostile_drivers.py`, or with `--drivers` a folder with `evil.py`, which announces
 `evil:MODE` as robot and `evilcam:MODE` as camera. Both log every motion: whether the joints sent are beyond
-a limit, and how many motions run at once. Counted are goals beyond limits, motions at once, exit codes that
-mean a mistake of ours, answers outside twice their stated radius, and sessions that do not go on with
---resume. `--sessions` mixes faults of robot and camera in 30 % of the calls.
+a limit, and how many motions run at once. Counted are goals beyond limits, motions at once, robots that are
+closed while they move, exit codes that mean a mistake of ours, answers outside twice their stated radius, and
+sessions that do not go on with --resume. `--sessions` mixes faults of robot and camera in 30 % of the calls.
 """
 
 import argparse
 import json
 import os
 import re
-import subprocess
+import signal
 import sys
 import tempfile
 import time
+import traceback
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from handeye.robots import open_arm
-from handeye.session.simulated import SimulationOptions, simulated_cell
+# Imported once for all runs.
+import handeye.cli.run
+import handeye.cli.run_answer
+import handeye.report  # noqa: F401
+from handeye.cli.boundary import run as run_command
 
 EVIL_ROBOT = """
 ok raise raise_once sysexit kbd hang hang_once slow refuse half elsewhere ignore mem longmsg binmsg degrees
@@ -44,12 +50,36 @@ hostile = hostile_drivers:Robot
 hostilecam = hostile_drivers:Camera
 """
 # Few views, much asked for, little patience: the faults come at the fourth motion or picture.
-HANDEYE = (sys.executable, "-c", "from handeye.cli import main; main()")
 ASKED = ("--accuracy-mm", "0.02", "--accuracy-deg", "0.002", "--no-confirm", "--json")
 SPACE = ("--workspace-mm", "-900", "-900", "20", "900", "900", "1400")
-# Both kinds of drivers stand in this cell.
-ARM, SEED = "epson_c4l", 31
-TRUTH = simulated_cell(open_arm(ARM), SimulationOptions(seed=SEED))
+ARM = "epson_c4l"
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is told of the cell, and what is true of it."""
+
+    camera: dict[str, Any]
+    target: dict[str, Any]
+    T_camera_flange: np.ndarray
+    robot_modes: tuple[str, ...]
+    camera_modes: tuple[str, ...]
+
+
+def told() -> Told:
+    """Return it from a process of its own: threads of the core would not live on in those that are forked."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        return pool.submit(_told).result()
+
+
+def _told() -> Told:
+    from hostile_drivers import CAMERA_MODES, CELL, ROBOT_MODES  # noqa: PLC0415 - in that process only
+
+    made = CELL
+    assert made.truth.X is not None
+    return Told(
+        made.cell.camera.to_dict(), made.cell.target.to_dict(), made.truth.X.matrix, ROBOT_MODES, CAMERA_MODES
+    )
 
 
 @dataclass(frozen=True)
@@ -63,64 +93,88 @@ class Drivers:
     target_file: Path
     robot_modes: tuple[str, ...]
     camera_modes: tuple[str, ...]
+    T_camera_flange: np.ndarray
 
 
 def ours(folder: Path) -> Drivers:
     """Announce our own drivers in an empty folder."""
-    from hostile_drivers import CAMERA_MODES, ROBOT_MODES  # noqa: PLC0415 - only where they are asked for
-
     announced = folder / "hostile-1.0.dist-info"
     announced.mkdir()
     (announced / "METADATA").write_text("Metadata-Version: 2.1\nName: hostile\nVersion: 1.0\n")
     (announced / "entry_points.txt").write_text(ENTRY_POINTS)
-    (folder / "camera.json").write_text(json.dumps(TRUTH.cell.camera.to_dict()))
-    (folder / "target.json").write_text(json.dumps(TRUTH.cell.target.to_dict()))
+    cell = told()
+    (folder / "camera.json").write_text(json.dumps(cell.camera))
+    (folder / "target.json").write_text(json.dumps(cell.target))
     path = (folder, Path(__file__).resolve().parent)
     files = folder / "camera.json", folder / "target.json"
-    return Drivers(path, "hostile", "hostilecam", *files, ROBOT_MODES, CAMERA_MODES)
+    return Drivers(
+        path, "hostile", "hostilecam", *files, cell.robot_modes, cell.camera_modes, cell.T_camera_flange
+    )
 
 
-def run(arguments: list[str], environment: dict[str, str], folder: Path, seconds: float) -> dict[str, Any]:
-    """Run a command; return its exit code, what it said and the answer's distance from the truth."""
+def run(
+    arguments: list[str], environment: dict[str, str], folder: Path, seconds: float, truth: np.ndarray
+) -> dict[str, Any]:
+    """Run a command in a process of its own; return its exit code, what it said and how far off it is."""
     began = time.monotonic()
-    try:
-        done = subprocess.run(
-            arguments,
-            cwd=folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=seconds,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return {"code": "timeout", "said": "", "seconds": seconds}
-    said = done.stderr.strip().splitlines()
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            code = called(arguments, environment, folder)
+        except BaseException:  # noqa: BLE001 - what is not caught there is what is looked for
+            traceback.print_exc()
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(code)
+    status = None
+    while status is None:
+        pid, ended = os.waitpid(child, os.WNOHANG)
+        if pid:
+            status = os.waitstatus_to_exitcode(ended)
+        elif time.monotonic() - began > seconds:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            return {"code": "timeout", "said": "", "seconds": seconds}
+        else:
+            time.sleep(0.02)
+    printed, errors = ((folder / name).read_text(errors="replace") for name in ("stdout", "stderr"))
+    said = errors.strip().splitlines()
     return {
-        "code": done.returncode,
+        "code": status,
         "said": next((line for line in reversed(said) if line.startswith("error")), said[-1] if said else ""),
         "seconds": time.monotonic() - began,
-        "traceback": "Traceback" in done.stderr or "PanicException" in done.stderr,
-        "failures": sorted(set(re.findall(r"s  ([a-z_]+): ", done.stderr))),
-        "off": off(done.stdout),
+        "traceback": "Traceback" in errors or "PanicException" in errors,
+        "failures": sorted(set(re.findall(r"s  ([a-z_]+): ", errors))),
+        "off": off(printed, truth),
     }
 
 
-def off(printed: str) -> float:
+def called(arguments: list[str], environment: dict[str, str], folder: Path) -> int:
+    """Run a command in this process, which has imported all that it needs; return its exit code."""
+    for name, number in (("stdout", 1), ("stderr", 2)):
+        os.dup2(os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.chdir(folder)
+    os.environ.update(environment)
+    sys.path[:0] = environment["PYTHONPATH"].split(os.pathsep)
+    return run_command(arguments)
+
+
+def off(printed: str, truth: np.ndarray) -> float:
     """Return by how many times its stated radius an answer is off; 0 without an answer."""
     try:
         answer = json.loads(printed[printed.index("\n{\n" if printed[:1] != "{" else "{") :])
         found, within = answer["calibration"]["T_flange_camera"], answer["within_95"]
     except (ValueError, KeyError, TypeError):
         return 0.0
-    if found is None or within is None or TRUTH.truth.X is None:
+    if found is None or within is None:
         return 0.0
     matrix = np.array(found["matrix"] if isinstance(found, dict) else found)
-    # The recorded X is T_camera_flange.
-    error = TRUTH.truth.X.matrix @ matrix
+    error = truth @ matrix
     angle = np.rad2deg(np.arccos(np.clip((np.trace(error[:3, :3]) - 1) / 2, -1, 1)))
-    distance = 1e3 * float(np.linalg.norm(matrix[:3, 3] - TRUTH.truth.X.inverse().translation))
+    distance = 1e3 * float(np.linalg.norm(matrix[:3, 3] - np.linalg.inv(truth)[:3, 3]))
     return max(distance / within["translation_mm"], float(angle) / within["rotation_deg"])
 
 
@@ -129,16 +183,15 @@ def attempt(drivers: Drivers, robot: str, camera: str, options: argparse.Namespa
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         log = folder / "motions.log"
-        before = os.environ.get("PYTHONPATH", "")
-        environment = dict(os.environ) | {
-            "PYTHONPATH": os.pathsep.join([*map(str, drivers.path), before]),
+        environment = {
+            "PYTHONPATH": os.pathsep.join(map(str, drivers.path)),
             "EVIL_LOG": str(log),
             "HOSTILE_LOG": str(log),
             "EVIL_SLOW": "2.5",
         }
         if not options.rendered:
             environment |= {"EVIL_POINTS": "1", "HOSTILE_POINTS": "1"}
-        command = [*HANDEYE, "run", "--session", "session"]
+        command = ["run", "--session", "session"]
         patience = str(options.patience_s)
         first = [
             *("--robot", ARM, "--driver", robot, "--images", camera),
@@ -148,14 +201,16 @@ def attempt(drivers: Drivers, robot: str, camera: str, options: argparse.Namespa
             *("--max-views", str(options.views), "--move-timeout-s", "1.5"),
             *("--read-timeout-s", patience, "--camera-timeout-s", patience),
         ]
-        outcome = run([*command, *first], environment, folder, options.seconds)
+        truth = drivers.T_camera_flange
+        outcome = run([*command, *first], environment, folder, options.seconds, truth)
         began = (folder / "session").exists()
         again: list[dict[str, Any]] = []
         for faults in ({}, {"HOSTILE_CALM": "1"}) if began else ():
             line = [*command, "--resume", "--no-confirm", "--json"]
-            again.append(run(line, environment | faults, folder, options.seconds))
+            again.append(run(line, environment | faults, folder, options.seconds, truth))
         events = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
         moves = [event for event in events if event.get("event") == "move"]
+        closed = [event for event in events if event.get("event") == "close"]
         return {
             **outcome,
             "began": began,
@@ -165,6 +220,10 @@ def attempt(drivers: Drivers, robot: str, camera: str, options: argparse.Namespa
             "moves": len(moves),
             "beyond": sum(bool(move["beyond"]) for move in moves),
             "concurrent": sum(move["concurrent"] > 1 for move in moves),
+            "closed": len(closed),
+            "closed_early": sum(
+                event.get("event") == "close" and event["concurrent"] > 0 for event in events
+            ),
         }
 
 
@@ -189,7 +248,7 @@ def main() -> int:
             folder = options.drivers.resolve()
             files = folder / "simcam.json", folder / "simtarget.json"
             modes = tuple(EVIL_ROBOT.split()), tuple(EVIL_CAMERA.split())
-            drivers = Drivers((folder,), "evil", "evilcam", *files, *modes)
+            drivers = Drivers((folder,), "evil", "evilcam", *files, *modes, told().T_camera_flange)
         good = f"{drivers.robot}:ok,99", f"{drivers.camera}:ok,99"
         cases = [(f"{drivers.robot}:{mode}", good[1]) for mode in drivers.robot_modes]
         cases += [(good[0], f"{drivers.camera}:{mode}") for mode in drivers.camera_modes]
@@ -204,9 +263,11 @@ def main() -> int:
             found = attempt(drivers, robot, camera, options)
             codes = [found["code"], *found["again"]]
             wrong = found["beyond"] > 0 or found["concurrent"] > 0 or 1 in codes or "timeout" in codes
+            wrong = wrong or found["closed_early"] > 0
             wrong = wrong or bool(found["traceback"]) or max(found["offs"]) > 2
             bad, worst = bad + wrong, max(worst, *found["offs"])
             counts = f"moves {found['moves']} beyond {found['beyond']} at once {found['concurrent']}"
+            counts += f" closed {found['closed']}"
             print(
                 f"{'WRONG' if wrong else 'ok':<6}{robot:<20} {camera:<20} exit {found['code']} "
                 f"then {found['again']} {counts} off {max(found['offs']):.2f} {found['seconds']:.0f} s "

@@ -1,14 +1,25 @@
 """`handeye run` from nothing to a session that other commands take, without a robot."""
 
+import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from commands import Handeye
 from folders import made_recording, written
+from handeye.cameras.protocol import Frame
+from handeye.cameras.simulated import Optics
+from handeye.errors import ExitCode
+from handeye.extension import CAMERAS, ROBOTS
 from handeye.notations import NOTATIONS, read_pose_text
 from handeye.robots import open_arm
+from handeye.robots.protocol import Goal
+from handeye.session.attempt import Cell
+from handeye.session.calls import Calls
+from handeye.session.simulated import SimulationOptions, simulated_cell
 
 QUICK = ("--points-only", "0.1", "--seed", "5")
 LOOSE = ("--accuracy-mm", "5", "--accuracy-deg", "0.5")
@@ -112,3 +123,62 @@ def test_through_the_views_of_a_recording(handeye: Handeye, tmp_path: Path) -> N
     assert handeye.fails("run", "--dry-run", "--driver", f"replay:{folder}")["exit_code"] == 2
     missing = handeye.fails("run", "--session", tmp_path / "u", "--driver", f"replay:{tmp_path / 'none'}")
     assert missing["exit_code"] == 3
+
+
+class Opened:
+    """Announces the drivers of a simulated cell, which note when they are closed."""
+
+    def __init__(self, cell: Cell, group: str) -> None:
+        self.closed = list[str]()
+        self._device: Any = cell.robot if group == ROBOTS else cell.source
+        self._group = group
+        self.failing: BaseException | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._device, name)
+
+    def load(self) -> Callable[[str], Any]:
+        return lambda _: self
+
+    def move_to(self, goal: Goal) -> None:
+        if self.failing is not None and goal.label.startswith("view_02"):
+            raise self.failing
+        self._device.move_to(goal)
+
+    def grab(self, label: str) -> Frame:
+        return self._device.grab(label)
+
+    def close(self) -> None:
+        self.closed.append(self._group)
+
+
+def test_drivers_are_closed_at_the_end_of_every_run(
+    handeye: Handeye, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = SimulationOptions(seed=31, optics=Optics(points_only=0.1))
+    cell = simulated_cell(open_arm("epson_c4l"), options).cell
+    drivers = {group: Opened(cell, group) for group in (ROBOTS, CAMERAS)}
+    monkeypatch.setattr("handeye.session.drivers.announced", lambda group: {"noted": drivers[group]})
+    for name, value in (("camera", cell.camera), ("target", cell.target)):
+        (tmp_path / f"{name}.json").write_text(json.dumps(value.to_dict()))
+    line = [
+        *("run", "--driver", "noted:x", "--images", "noted:x", "--robot", "epson_c4l", "--no-confirm"),
+        *("--camera", tmp_path / "camera.json", "--target", tmp_path / "target.json"),
+        *("--workspace-mm", "-900", "-900", "20", "900", "900", "1400", *LOOSE),
+    ]
+
+    def closed() -> list[int]:
+        found = [len(driver.closed) for driver in drivers.values()]
+        for driver in drivers.values():
+            driver.closed.clear()
+        return found
+
+    assert handeye(*line, "--dry-run").code == 0
+    assert closed() == [1, 1]
+    drivers[ROBOTS].failing = KeyboardInterrupt()
+    monkeypatch.setattr(Calls, "run", lambda _self, _seconds, call, *arguments: call(*arguments))
+    assert handeye(*line, "--session", tmp_path / "s").code == ExitCode.INTERRUPTED
+    assert closed() == [1, 1]
+    drivers[ROBOTS].failing = None
+    assert handeye("run", "--resume", "--session", tmp_path / "s", "--no-confirm").code == 0
+    assert closed() == [1, 1]
