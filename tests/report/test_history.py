@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from commands import Handeye
 from handeye.estimation import Measurements, make_estimator
 from handeye.report.document import Within
 from handeye.report.history import MOST_POINTS, attempts, curve, request
@@ -13,6 +14,7 @@ from handeye.session.store import create_session
 from handeye.types import Pose
 from handeye.types.calibration import ModelName
 from pages import opened_cell
+from sessions import configured, run
 
 
 @pytest.fixture
@@ -79,3 +81,25 @@ def test_session_tells_request_and_failures(session: Path) -> None:
 def test_other_folders_have_neither(tmp_path: Path) -> None:
     assert attempts(tmp_path) == []
     assert request(tmp_path, Within(translation_mm=1.0, rotation_deg=1.0)) is None
+
+
+@pytest.mark.parametrize("spoilt", ["journal.jsonl", "session.json", None])
+def test_a_session_that_cannot_go_on_is_reported_from_its_recording(
+    handeye: Handeye, tmp_path: Path, spoilt: str | None
+) -> None:
+    folder = tmp_path / "session"
+    run(configured(4, most_views=4, accuracy_mm=None, accuracy_deg=None), folder)
+    if spoilt is None:
+        # A reading of the wrong length, as sessions of before took.
+        path = folder / "recording.toml"
+        joints = "joints_rad = ["
+        head, _, rest = path.read_text().rpartition(joints)
+        path.write_text(f"{head}{joints}0.1, 0.2, 0.3]{rest[rest.index(']') + 1 :]}")
+    else:
+        path = folder / spoilt
+        path.write_bytes(path.read_bytes().replace(b"view_0", b"view_1", 1).replace(b"seed", b"sead", 1))
+    told = handeye.json("report", folder, "--output", tmp_path / "page.html")
+    assert told["answer"]
+    assert (tmp_path / "page.html").exists()
+    assert any("recording alone" in warning for warning in told["warnings"]) == (spoilt is not None)
+    assert (told["request"] is None) or spoilt is None

@@ -12,7 +12,7 @@ from handeye.datasets import read_recording
 from handeye.errors import DeviceError, InputError
 from handeye.estimation import solve
 from handeye.robots import ArmKinematics, open_arm
-from handeye.robots.protocol import Goal
+from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.session.attempt import Cell, Missed, Timeouts
 from handeye.session.calls import Calls
 from handeye.session.choosing import ArmChooser
@@ -236,3 +236,49 @@ def test_settings_of_sessions_of_earlier_versions_are_read() -> None:
     known = replace(configured(3), timeouts=Timeouts(move_s=7.0)).to_dict()
     known["patience"] = known.pop("timeouts")
     assert Configuration.from_dict(known).timeouts.move_s == 7.0
+
+
+class Stuck:
+    """A robot that from some motion on stays where it is."""
+
+    def __init__(self, robot: Robot, first: int, error: DeviceError | None) -> None:
+        self._robot, self._left, self._error = robot, first - 1, error
+
+    def move_to(self, goal: Goal) -> None:
+        self._left -= 1
+        if self._left >= 0:
+            self._robot.move_to(goal)
+        elif self._error is not None:
+            raise self._error
+
+    def read_pose(self) -> Reading:
+        return self._robot.read_pose()
+
+    def stop(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("first", [1, 2, 4, 6])
+@pytest.mark.parametrize(
+    "error", [None, DeviceError("no", code="motion_refused"), DeviceError("no")], ids=["lies", "no", "fails"]
+)
+def test_a_robot_that_is_stuck_ends_the_session_by_name_within_few_attempts(
+    tmp_path: Path, first: int, error: DeviceError | None
+) -> None:
+    prepared = prepare(configured(77, accuracy_mm=0.02, accuracy_deg=0.002))
+    stuck = Stuck(prepared.cell.robot, first, error)
+    prepared = replace(prepared, cell=replace(prepared.cell, robot=stuck))
+    session, store = begin(prepared, tmp_path / "s")
+    try:
+        end = session.run()
+        entries = store.entries
+    finally:
+        store.close()
+    assert end.reason in {EndReason.TOO_MANY_FAILURES, EndReason.NO_START}
+    missed = [entry for entry in entries if entry.failure is not None]
+    assert len(missed) <= prepared.configuration.wish().failures_in_a_row
+    # No place is tried for ever, and none that was seen is taken for another view.
+    tries = prepared.configuration.wish().tries_at_a_place
+    places = [entry.goal_joints for entry in missed if entry.failure is not Failure.ROBOT_FAILED]
+    assert all(places.count(place) <= tries for place in places)
+    assert len({entry.standing_rad for entry in entries if entry.view is not None}) == end.views

@@ -22,7 +22,7 @@ from handeye.report import document
 from handeye.report.advice import advice
 from handeye.report.document import Answer, NoiseLevels, Open, Report, Said, ViewLine, Within
 from handeye.report.drawings import Drawing, drawings_of
-from handeye.report.history import arm_of, attempts, curve, request
+from handeye.report.history import arm_of, attempts, curve, doubt, request
 from handeye.report.recipe import recipe
 from handeye.report.regions import USUAL_DISTANCES_M, at_points, position_axes, rotation_axes, within
 from handeye.report.views import ViewPicture, view_lines, view_picture
@@ -81,7 +81,8 @@ def gather_recording(
     Parameters
     ----------
     opened
-        Where the views come from; a session among them is reported with its request and its failed attempts.
+        Where the views come from; a session among them is reported with its request and its failed attempts,
+        unless its settings or its journal were changed: then a warning says so.
     model, reduced
         As for `handeye.estimation.solve`.
     command
@@ -100,13 +101,14 @@ def gather_recording(
     """
     recording = opened.recording
     measurements = Measurements.of_recording(recording)
-    kinematics = arm_of(opened.folder, recording, model)
+    doubtful = doubt(opened.folder)
+    kinematics = None if doubtful else arm_of(opened.folder, recording, model)
     examination = examine(measurements)
     calibration = calibrate_examined(
         examination, model, reduced=reduced, kinematics=kinematics, work=work or Work()
     )
     measurements = examination.among(measurements)
-    warnings = [str(warning) for warning in opened.warnings]
+    warnings = [str(warning) for warning in opened.warnings] + ([doubtful] if doubtful else [])
     known = within(calibration.covariance, calibration.degrees_of_freedom)
     lines = view_lines(calibration, measurements)
     distances = _working_distances(line.distance_mm for line in lines if line.used)
@@ -124,8 +126,8 @@ def gather_recording(
         target=recording.target.to_dict(),
         views=[*lines, *_left_out(calibration, opened, {line.name for line in lines})],
         curve=curve(measurements.select(used), model, kinematics),
-        attempts=attempts(opened.folder),
-        request=request(opened.folder, known),
+        attempts=[] if doubtful else attempts(opened.folder),
+        request=None if doubtful else request(opened.folder, known),
         true_error=_true_error(calibration, recording),
         recipe=recipe(command, recording, made),
     )

@@ -19,19 +19,35 @@ from handeye.types.calibration import ModelName
 MOST_POINTS = 14
 
 
+def doubt(folder: Path) -> str | None:
+    """Say why what a session says of itself is not to be believed; None where it is, or there is no session.
+
+    Its settings or its journal were changed, cut or lost. The recording beside them may be whole.
+    """
+    if not is_session(folder):
+        return None
+    try:
+        Configuration.from_dict(read_settings(folder).asked.get("configuration"))
+        read_journal(folder)
+    except InputError as error:
+        return f"{error.message}; this page is of the recording alone"
+    return None
+
+
 def arm_of(folder: Path, recording: Recording, model: ModelName) -> ArmKinematics | None:
     """Return the arm whose joints a session weighed; None where the folder is no session, or it did not.
 
-    An arm whose file is gone is not known either.
+    An arm whose file is gone is not known either, nor one that has another number of joints.
     """
     if not is_session(folder) or model is not ModelName.AUTO:
         return None
     asked = Configuration.from_dict(read_settings(folder).asked.get("configuration"))
-    joints_known = all(view.joints_rad is not None for view in recording.views)
-    if asked.robot is None or not asked.joints_err or not joints_known:
+    if asked.robot is None or not asked.joints_err:
         return None
     try:
         arm = open_arm(asked.robot)
+        if any(view.joints_rad is None or len(view.joints_rad) != len(arm) for view in recording.views):
+            return None
         # A recording may be in other frames than the description; a driver reports in its frames.
         return arm_kinematics(arm, recording.views) if asked.is_replay else ArmKinematics(arm)
     except InputError:

@@ -101,14 +101,17 @@ class ArmChooser:
 
     def _starting(self, situation: Situation) -> Step | Halt:
         views, missed, estimate = situation.views, situation.counted, situation.estimate
-        if not views and missed and missed[-1].failure is Failure.NOT_FOUND:
-            tries = sum(1 for entry in missed if entry.failure is Failure.NOT_FOUND)
-            if tries >= self._wish.tries_at_a_place:
-                return Halt(
-                    EndReason.NO_START,
-                    f"the target is not seen where the arm stands: {missed[-1].detail}; drive it so that the "
-                    "camera sees the whole target, and begin again",
-                )
+        tries = [entry for entry in missed if entry.failure not in TRANSIENT]
+        # The first place is the only one that there is yet.
+        if not views and len(tries) >= self._wish.tries_at_a_place:
+            last = tries[-1]
+            return Halt(
+                EndReason.NO_START,
+                f"the target is not seen where the arm stands: {last.detail}; drive it so that the "
+                "camera sees the whole target, and begin again"
+                if last.failure is Failure.NOT_FOUND
+                else f"nothing comes of the first view, where the arm stands: {last.failure}: {last.detail}",
+            )
         places = len({entry.goal_joints for entry in missed})
         body = self._body if estimate is None else self._generator.body(estimate)
         tilt_rad = largest_tilt_rad(views[0], self._camera) if views else 0.0
