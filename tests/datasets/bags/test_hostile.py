@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from handeye.datasets.bags import is_bag, read_contents
+from datasets.test_images import claimed_png
+from handeye.datasets.bags import grey_of, is_bag, read_contents
 from handeye.datasets.bags.mcap import MAGIC as MCAP
-from handeye.datasets.bags.messages import READERS
+from handeye.datasets.bags.messages import READERS, Compressed, Raw
 from handeye.datasets.bags.rosbag1 import MAGIC as ROSBAG1
 from handeye.datasets.bags.unpacking import unpacked
 from handeye.datasets.bags.wire import Wire
@@ -145,3 +146,17 @@ def test_metadata_that_leads_out_of_its_folder(tmp_path: Path) -> None:
     (bag / "metadata.yaml").write_text(metadata + "  compression_mode: FILE\n")
     with pytest.raises(InputError, match="file by file"):
         read_contents(bag)
+
+
+def test_pictures_in_messages_that_claim_more_than_they_hold(tmp_path: Path) -> None:
+    png = claimed_png(tmp_path / "a.png", 16000, 16000).read_bytes()
+    bmp = struct.pack("<2sIHHIIiiHHIIiiII", b"BM", 60, 0, 0, 54, 40, 16000, 16000, 1, 24, 0, 0, 0, 0, 0, 0)
+    jpeg = b"\xff\xd8\xff\xc0\x00\x0b\x08" + struct.pack(">HH", 65000, 65000) + b"\x01\x01\x11\x00\xff\xd9"
+    for content in (png, bmp + bytes(6), jpeg):
+        with pytest.raises(InputError, match=r"which no camera's picture has|expected at most") as caught:
+            grey_of(Compressed(0, "png", memoryview(content)), "x")
+        assert caught.value.code == "too_large"
+    for height, width, step in ((1 << 31, 1 << 31, 1 << 31), (1 << 14, 1 << 14, 1 << 14), (1, 1 << 28, 1)):
+        for encoding in ("mono8", "mono16", "rgb8"):
+            with pytest.raises(InputError, match="in 9 bytes"):
+                grey_of(Raw(0, height, width, encoding, False, step, memoryview(bytes(9))), "x")
