@@ -3,14 +3,15 @@
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from handeye.cameras.simulated import Optics
 from handeye.datasets import read_recording
-from handeye.errors import DeviceError, InputError
-from handeye.estimation import solve
+from handeye.errors import DeviceError, InputError, SolveError
+from handeye.estimation import Estimate, Measurements, RigEstimate, estimate_rig, solve
 from handeye.robots import ArmKinematics, open_arm
 from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.session.attempt import Cell, Missed, Timeouts
@@ -26,7 +27,7 @@ from handeye.session.simulated import SimulatedCell, SimulationOptions, simulate
 from handeye.session.store import SessionStore, create_session
 from handeye.session.wish import Wish
 from handeye.types import Chessboard, CircleGrid, Mounting, Pose
-from sessions import attempt, configured
+from sessions import RIG, attempt, configured, run_rig
 
 
 def ended(configuration: Configuration, folder: Path) -> tuple[End, Prepared, SessionStore]:
@@ -282,3 +283,43 @@ def test_a_robot_that_is_stuck_ends_the_session_by_name_within_few_attempts(
     places = [entry.goal_joints for entry in missed if entry.failure is not Failure.ROBOT_FAILED]
     assert all(places.count(place) <= tries for place in places)
     assert len({entry.standing_rad for entry in entries if entry.view is not None}) == end.views
+
+
+def test_numbers_that_fail_once_do_not_end_a_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session, store = begin(
+        prepare(configured(6, accuracy_mm=None, accuracy_deg=None, most_views=6)), tmp_path / "s"
+    )
+    estimator, asked = session._estimator, list[int]()  # pyright: ignore[reportPrivateUsage]
+
+    def failing(measurements: Measurements) -> Estimate:
+        asked.append(len(measurements))
+        if len(measurements) in {3, 5}:
+            raise SolveError("singular")
+        return estimator(measurements)
+
+    monkeypatch.setattr(session, "_estimator", failing)
+    try:
+        end = session.run()
+    finally:
+        store.close()
+    assert {3, 5} <= set(asked)
+    assert (end.reason, end.views) == (EndReason.VIEWS_TAKEN, 6)
+    assert end.calibration is not None
+
+
+def test_numbers_that_fail_once_do_not_end_a_session_of_several_cameras(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = [2]
+
+    def failing(*arguments: Any, **named: Any) -> RigEstimate:
+        left[0] -= 1
+        if left[0] >= 0:
+            raise SolveError("singular")
+        return estimate_rig(*arguments, **named)
+
+    monkeypatch.setattr("handeye.session.rig.estimate_rig", failing)
+    end = run_rig(replace(RIG, seed=4), tmp_path / "s")
+    assert left[0] < 0
+    assert end.stations == RIG.most_views
+    assert end.calibration is not None

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from handeye.codes import Code
-from handeye.errors import InputError
+from handeye.errors import InputError, SolveError
 from handeye.estimation import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
 from handeye.estimation.confidence import Within
 from handeye.estimation.faults import Examination, examine
@@ -168,14 +168,21 @@ class Session(Stepping[Situation, End]):
         measurements = self._with(views)
         if len(measurements) < START_VIEWS:
             return measurements, None
-        estimate = self._estimator(measurements)
-        if len(measurements) < FEWEST_EXAMINED or all_agree(measurements, estimate):
+        estimate = self._estimated(measurements)
+        if estimate is None or len(measurements) < FEWEST_EXAMINED or all_agree(measurements, estimate):
             return measurements, estimate
         try:
             measurements = self._examined(measurements).measurements
         except InputError:
             return measurements, estimate  # Shared by all of them; said at the end.
-        return measurements, self._estimator(measurements) if len(measurements) >= START_VIEWS else None
+        return measurements, self._estimated(measurements) if len(measurements) >= START_VIEWS else None
+
+    def _estimated(self, measurements: Measurements) -> Estimate | None:
+        """Return what the views say; None where their numbers fail, and further views tell more."""
+        try:
+            return self._estimator(measurements)
+        except SolveError:
+            return None
 
     def _examined(self, measurements: Measurements) -> Examination:
         """Look for mistakes; a camera that the views teach is found again without those that are wrong."""

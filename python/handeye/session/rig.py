@@ -6,7 +6,7 @@ Journal, lock, checks before and after every motion, and going on after a break 
 from dataclasses import dataclass
 
 from handeye.codes import Code
-from handeye.errors import DegenerateError, InputError
+from handeye.errors import DegenerateError, InputError, SolveError
 from handeye.estimation import RigCalibration, RigEstimate, RigMeasurements, estimate_rig, solve_rig
 from handeye.estimation.faults import examine
 from handeye.estimation.rig_checks import check_tied
@@ -118,8 +118,8 @@ class RigSession(Stepping[RigSituation, RigEnd]):
         try:
             check_tied(measurements)
             estimate = estimate_rig(measurements, self._kinematics)
-        except (InputError, DegenerateError):
-            return None
+        except (InputError, DegenerateError, SolveError):
+            return None  # further stations tell more
         return estimate if estimate.determined else None
 
     def _end(self, reason: EndReason, sentence: str) -> RigEnd:
