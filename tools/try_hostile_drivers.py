@@ -240,7 +240,7 @@ def main() -> int:
     parser.add_argument("--patience-s", type=float, default=1.0, help="for readings and pictures")
     parser.add_argument("--seconds", type=float, default=120.0, help="longest run")
     options = parser.parse_args()
-    bad, worst = 0, 0.0
+    bad, stuck, worst = 0, 0, 0.0
     with tempfile.TemporaryDirectory() as name:
         if options.drivers is None:
             drivers = ours(Path(name))
@@ -265,16 +265,23 @@ def main() -> int:
             wrong = found["beyond"] > 0 or found["concurrent"] > 0 or 1 in codes or "timeout" in codes
             wrong = wrong or found["closed_early"] > 0
             wrong = wrong or bool(found["traceback"]) or max(found["offs"]) > 2
+            # Without faults our own drivers have nothing that a session could not go on with.
+            held = drivers.robot == "hostile" and found["began"] and codes[-1] != 0
+            stuck += held
             bad, worst = bad + wrong, max(worst, *found["offs"])
             counts = f"moves {found['moves']} beyond {found['beyond']} at once {found['concurrent']}"
             counts += f" closed {found['closed']}"
+            word = "WRONG" if wrong else "STUCK" if held else "ok"
             print(
-                f"{'WRONG' if wrong else 'ok':<6}{robot:<20} {camera:<20} exit {found['code']} "
+                f"{word:<6}{robot:<20} {camera:<20} exit {found['code']} "
                 f"then {found['again']} {counts} off {max(found['offs']):.2f} {found['seconds']:.0f} s "
                 f"{','.join(found.get('failures', []))} | {found['said'][:150]}",
                 flush=True,
             )
-    print(f"{bad} of {len(cases)} wrong, answers at most {worst:.2f} of their stated radius off")
+    print(
+        f"{bad} of {len(cases)} wrong, {stuck} do not go on without faults, "
+        f"answers at most {worst:.2f} of their stated radius off"
+    )
     return 1 if bad else 0
 
 
