@@ -77,8 +77,9 @@ def _default(found: Mapping[str, Any]) -> list[str]:
     return [
         "## The default model",
         (
-            "Milliseconds, median and quartiles. Estimates are of simulated cells with all errors at once; "
-            "solving is all that `handeye solve` does with the shipped recording after its corners are found."
+            "Milliseconds, median and quartiles. Estimates are of simulated cells with all errors at once, "
+            "of one camera unless said; solving is all that `handeye solve` does with the shipped "
+            "recording after its corners are found."
         ),
         _table(["what", "median", "low", "high"], rows),
     ]
