@@ -79,6 +79,19 @@ def test_cameras_of_one_body_are_free_of_the_arm_in_each_other() -> None:
     assert 3 * np.mean(together) < np.mean(apart)
 
 
+@pytest.mark.parametrize("number", [0, 10, 11, 34])
+def test_an_arm_that_misses_by_a_degree_does_not_part_cameras(number: int) -> None:
+    """Twists of a degree are far from linear: what is free of the arm is, only where the arm truly stood."""
+    recording = simulate_rig(ErrorKind.ROBOT_NOISE_1_DEG, number, seed=3500)
+    estimate = estimate_rig(RigMeasurements.of(recording), KNOWN)
+    truth = recording.truth
+    assert truth is not None
+    for a, b in (("left", "right"), ("front", "side")):
+        off = estimate.camera_to_camera(a, b).pose @ (truth.cameras[a] @ truth.cameras[b].inverse()).inverse()
+        assert np.linalg.norm(off.log()[:3]) < 2e-3
+        assert np.linalg.norm(off.log()[3:]) < np.deg2rad(0.2)
+
+
 def test_a_fixed_camera_is_found_through_a_board_that_another_knows() -> None:
     recording = simulate_rig(ErrorKind.MIXTURE_CELL, 0)
     assert ("front", "table") in recording.pairs

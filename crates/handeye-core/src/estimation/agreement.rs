@@ -79,7 +79,7 @@ impl Agreement {
     /// [`Error::InvalidInput`] for a cell that does not fit together.
     pub fn new(cell: &Cell, (x, y): (Vec<Se3>, Vec<Se3>)) -> Result<Self, Error> {
         cell.check()?;
-        let guess = Guess { x, y };
+        let guess = Guess { x, y, away: vec![] };
         let mixed = assemble(cell, &guess, &components::independent(cell), &WeakPrior::default());
         Ok(Self { mixed, guess })
     }

@@ -118,6 +118,7 @@ impl Mixed {
                     roots: in_one(rows_of, &of),
                     pixels: from.pixels.clone(),
                     arm: from.flange.clone(),
+                    reduced: false,
                 }
             })
             .collect();

@@ -143,9 +143,13 @@ impl Cell {
         Columns { targets: 6 * self.cameras.len(), camera, boards, tips, end: tips + 3 * self.tips.len() }
     }
 
-    /// The middle `M` of the chain `X M Y` at a station.
+    /// The middle `M` of the chain `X M Y` at a station, by the pose that it reports.
     pub(super) fn middle(&self, m: &Measurement) -> Se3 {
-        let pose = &self.stations[m.station].pose;
+        self.middle_at(m, &self.stations[m.station].pose)
+    }
+
+    /// The same where the arm stands elsewhere.
+    pub(super) fn middle_at(&self, m: &Measurement, pose: &Se3) -> Se3 {
         match (self.cameras[m.camera].body, self.targets[m.target]) {
             (Body::Flange, Body::Base) => pose.inverse(),
             (Body::Base, Body::Flange) => *pose,

@@ -60,6 +60,9 @@ pub fn start_of_cell(
         (still, std::cmp::Reverse(of(*c, *t).len()))
     });
     loop {
+        if tie_rigidly(cell, &mut x, &mut y) {
+            continue;
+        }
         let open =
             |x: &[Option<Se3>], y: &[Option<Se3>], (c, t): (usize, usize)| x[c].is_none() || y[t].is_none();
         // Of those with a known end first: their other end follows.
@@ -104,6 +107,38 @@ pub fn start_of_cell(
             .collect::<Result<Vec<_>, _>>()
     };
     Ok(CellStart { x: all(x, "camera")?, y: all(y, "target")?, origin: origin.unwrap_or("given") })
+}
+
+/// Finds an unknown camera from a known one that is fixed to the same body, by targets that both saw at the same stations,
+/// or else a target from one known likewise: whatever the arm does, it does not part them. Whether there was any.
+fn tie_rigidly(cell: &Cell, x: &mut [Option<Se3>], y: &mut [Option<Se3>]) -> bool {
+    let together = || {
+        let stations = cell.measurements.chunk_by(|a, b| a.station == b.station);
+        stations.flat_map(|all| all.iter().flat_map(move |a| all.iter().map(move |b| (a, b))))
+    };
+    for c in (0..x.len()).filter(|c| x[*c].is_none()).collect::<Vec<_>>() {
+        let implied = together().filter(|(a, b)| {
+            b.camera == c && a.target == b.target && cell.cameras[a.camera].body == cell.cameras[c].body
+        });
+        let implied: Vec<Se3> =
+            implied.filter_map(|(a, b)| Some(b.pose.pose * a.pose.pose.inverse() * x[a.camera]?)).collect();
+        if !implied.is_empty() {
+            x[c] = Some(middle_of(implied.into_iter()));
+            return true;
+        }
+    }
+    for t in (0..y.len()).filter(|t| y[*t].is_none()).collect::<Vec<_>>() {
+        let implied = together().filter(|(a, b)| {
+            b.target == t && a.camera == b.camera && cell.targets[a.target] == cell.targets[t]
+        });
+        let implied: Vec<Se3> =
+            implied.filter_map(|(a, b)| Some(y[a.target]? * a.pose.pose.inverse() * b.pose.pose)).collect();
+        if !implied.is_empty() {
+            y[t] = Some(middle_of(implied.into_iter()));
+            return true;
+        }
+    }
+    false
 }
 
 /// Covariance added to the poses: a millimetre and 0.05 degrees per axis, so that a robot that is not exact does not

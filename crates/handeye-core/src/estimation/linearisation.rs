@@ -12,6 +12,9 @@ pub(super) struct Guess {
     pub x: Vec<Se3>,
     /// `Y` of each target.
     pub y: Vec<Se3>,
+    /// Of stations with a measurement, the twist by which the flange stands elsewhere than reported, in its own
+    /// frame; of those that are missing, none.
+    pub away: Vec<Vector6<f64>>,
 }
 
 impl Guess {
@@ -22,6 +25,7 @@ impl Guess {
         Self {
             x: self.x.iter().enumerate().map(|(c, x)| Se3::exp(&twist(c)) * *x).collect(),
             y: self.y.iter().enumerate().map(|(t, y)| Se3::exp(&twist(cameras + t)) * *y).collect(),
+            away: self.away.clone(),
         }
     }
 }
@@ -60,7 +64,10 @@ pub(super) fn linearise(cell: &Cell, guess: &Guess) -> Linearisation {
     let mut information = DMatrix::zeros(columns.end, columns.end);
     let mut gradient = DVector::zeros(columns.end);
     let mut stations = Vec::new();
-    for group in cell.measurements.chunk_by(|a, b| a.station == b.station) {
+    let groups = cell.measurements.chunk_by(|a, b| a.station == b.station);
+    for (k, group) in groups.enumerate() {
+        let away = guess.away.get(k).copied().unwrap_or_default();
+        let pose = cell.stations[group[0].station].pose * Se3::exp(&away);
         let size = 6 * group.len();
         let mut rows = Rows {
             station: group[0].station,
@@ -73,7 +80,7 @@ pub(super) fn linearise(cell: &Cell, guess: &Guess) -> Linearisation {
         for (i, m) in group.iter().enumerate() {
             let at = 6 * i;
             let (x, y) = (&guess.x[m.camera], &guess.y[m.target]);
-            let before = *x * cell.middle(m);
+            let before = *x * cell.middle_at(m, &pose);
             let (of_x, of_y) = (x.adjoint(), before.adjoint());
             let e = (before * *y * m.pose.pose.inverse()).log();
             rows.e.rows_mut(at, 6).copy_from(&e);
@@ -107,6 +114,9 @@ pub(super) fn linearise(cell: &Cell, guess: &Guess) -> Linearisation {
                 _ => {}
             }
         }
+        // As it would be where the arm says it stands, were it linear all the way.
+        let back = &rows.flange * DVector::from_column_slice(away.as_slice());
+        rows.e -= back;
         stations.push(rows);
     }
     stations.extend(cell.touches.iter().map(|touch| rows_of_touch(cell, guess, &columns, touch)));

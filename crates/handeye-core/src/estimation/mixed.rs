@@ -83,6 +83,8 @@ pub(super) struct Station {
     pub pixels: DMatrix<f64>,
     /// Derivative of the twists in a twist of the flange, through which all acts that the arm does wrong.
     pub arm: DMatrix<f64>,
+    /// Whether several measurements were reduced to six rows.
+    pub reduced: bool,
 }
 
 /// Rows in units of a noise that is the same at all levels.

@@ -111,11 +111,15 @@ const LONGEST_STEP: f64 = 1.5;
 pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> Result<Posterior, Error> {
     cell.check()?;
     let components = components::all(cell, &options.assumptions)?;
-    let mut guess = Guess { x: start.0, y: start.1 };
+    let mut guess = Guess { x: start.0, y: start.1, away: vec![] };
     let mut levels: Option<DVector<f64>> = None;
     let (mut steps, mut rounds, mut converged) = (0, 0, false);
     let at = |guess: &Guess| assemble(cell, guess, &components, &options.weak).reduced().ok_or_else(singular);
     let mut mixed = at(&guess)?;
+    if mixed.settled.rows > 0 {
+        guess.away = mixed.flange_twists(None);
+        mixed = at(&guess)?;
+    }
     let mut mode = None;
     while rounds < options.most_rounds {
         rounds += 1;
@@ -127,15 +131,14 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
         let answer = answer_at(&mixed, &found.t)?;
         let moved = largest_share(&answer, 6 * (cell.cameras.len() + cell.targets.len()));
         levels = Some(found.t.clone());
-        let rest = moved < AT_REST;
-        mode = Some(found);
-        if rest {
+        if moved < AT_REST {
             converged = true;
+            mode = Some(found);
             break;
         }
         guess = guess.moved(answer.theta.as_slice());
+        guess.away = mixed.flange_twists(Some((&found.t, &answer.theta)));
         mixed = at(&guess)?;
-        mode = None;
     }
     let found = match mode {
         Some(found) => found,

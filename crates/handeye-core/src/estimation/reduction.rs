@@ -2,12 +2,13 @@
 //!
 //! All that the arm does wrong at a station is a twist of its flange. In units of the pixels' noise the rows of its
 //! measurements are turned so that the first six carry that twist and the others do not: these have the same noise at
-//! all levels, and are summed once. What cameras say of each other is in them, free of the arm.
+//! all levels, and are summed once. What cameras say of each other is in them, free of the arm: as far as the twists are
+//! linear, so chains are linearised where the arm is found to have stood.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector, Vector6};
 
 use super::assembly::{in_one, square};
-use super::mixed::{Mixed, Station};
+use super::mixed::{Mixed, Station, add};
 use super::products::{Accumulate, Product, TOGETHER};
 use crate::simd::dispatch;
 
@@ -53,6 +54,7 @@ impl Mixed {
                 roots: in_one(TWIST, &of),
                 pixels: DMatrix::identity(TWIST, TWIST),
                 arm: arm.r(),
+                reduced: true,
             };
             for prior in self.priors.iter_mut().filter(|p| p.recurring) {
                 prior.squares[k] = square(&station.columns(prior, self.width));
@@ -72,5 +74,42 @@ impl Mixed {
         self.settled.rows = free.len() / self.width;
         self.settled.constant += sum[n * self.width + n];
         Some(self)
+    }
+
+    /// By which twist the flange stood elsewhere than reported at each reduced station, elsewhere none: what its
+    /// residuals show at levels `exp(t)` and parameters theta, or, where these are not known, all that they can show.
+    pub fn flange_twists(&self, found: Option<(&DVector<f64>, &DVector<f64>)>) -> Vec<Vector6<f64>> {
+        let twist = |(k, station): (usize, &Station)| -> Option<Vector6<f64>> {
+            if !station.reduced {
+                return None;
+            }
+            let rows = station.rows.chunks_exact(self.width);
+            let shown = match found {
+                None => DVector::from_iterator(TWIST, rows.map(|row| row[self.size])),
+                Some((t, theta)) => {
+                    let arm = self.arm_covariance(k, t, theta.len());
+                    let left = |row: &[f64]| -> f64 {
+                        row[self.size] + row.iter().zip(theta.iter()).map(|(b, x)| b * x).sum::<f64>()
+                    };
+                    let left = DVector::from_iterator(TWIST, rows.map(left));
+                    &arm * (&arm + &station.pixels).cholesky()?.solve(&left)
+                }
+            };
+            let twist = station.arm.solve_upper_triangular(&shown)?;
+            Some(-Vector6::from_column_slice(twist.as_slice()))
+        };
+        self.stations.iter().enumerate().map(|of| twist(of).unwrap_or_default()).collect()
+    }
+
+    /// Covariance of what the arm does new at a station, parameters from `told` on included.
+    fn arm_covariance(&self, k: usize, t: &DVector<f64>, told: usize) -> DMatrix<f64> {
+        let mut arm = DMatrix::zeros(TWIST, TWIST);
+        for x in &self.noises {
+            add(&mut arm, Self::deviation(&x.levels, t).powi(2), &x.squares[k]);
+        }
+        for p in self.priors.iter().filter(|p| p.first >= told) {
+            add(&mut arm, Self::deviation(&p.levels, t).powi(2), &p.squares[k]);
+        }
+        arm
     }
 }

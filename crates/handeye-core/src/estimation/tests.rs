@@ -95,7 +95,7 @@ fn options(described: bool) -> Options {
 }
 
 fn mixed_of(truth: &Truth, described: bool) -> Mixed {
-    let guess = Guess { x: truth.x.clone(), y: truth.y.clone() };
+    let guess = Guess { x: truth.x.clone(), y: truth.y.clone(), away: vec![] };
     let all = components::all(&truth.cell, &assumptions(described)).unwrap();
     let end = truth.cell.columns().end;
     let weak = (DMatrix::identity(end, end), DVector::zeros(end));
@@ -324,7 +324,7 @@ fn touched(truth: &mut Truth, scale: f64, sigma: f64) {
 fn rows_of_touches_are_their_derivatives() {
     let mut truth = made(70, (&[Body::Flange], &[Body::Base]), 4, 0.0, false);
     touched(&mut truth, 0.01, 1e-4);
-    let guess = Guess { x: truth.x.clone(), y: truth.y.clone() };
+    let guess = Guess { x: truth.x.clone(), y: truth.y.clone(), away: vec![] };
     let at = |cell: &Cell, guess: &Guess| linearise(cell, guess).stations[4].clone();
     let here = at(&truth.cell, &guess);
     let step = 1e-6;
