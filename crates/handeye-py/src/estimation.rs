@@ -274,7 +274,7 @@ pub fn body(on_flange: bool) -> Body {
 #[pyfunction]
 #[pyo3(signature = (
     stations, cameras, targets, seen, *, velocities=None, arm=None, approach=None, exact_robot=false, roughness=1.0, board_scale=false, start=None,
-    tips=vec![], touches=vec![], pairs, most_rounds,
+    tips=vec![], touches=vec![], pairs, most_rounds, levels=vec![],
 ))]
 #[expect(clippy::too_many_arguments, reason = "one argument per part of a cell")]
 fn estimate_cell<'py>(
@@ -294,6 +294,7 @@ fn estimate_cell<'py>(
     touches: Vec<TouchGiven<'py>>,
     pairs: usize,
     most_rounds: usize,
+    levels: Vec<f64>,
 ) -> PyResult<Posterior> {
     let poses = convert::transforms(py, "stations", &stations)?;
     let mut assumptions = Assumptions {
@@ -364,7 +365,7 @@ fn estimate_cell<'py>(
             Ok::<_, PyErr>((convert::transforms(py, "start X", &x)?, convert::transforms(py, "start Y", &y)?))
         })
         .transpose()?;
-    let options = Options { assumptions, weak: WeakPrior::default(), pairs, most_rounds };
+    let options = Options { assumptions, weak: WeakPrior::default(), pairs, most_rounds, levels };
     let (inner, origin) = py
         .core(|| {
             let given = given.as_ref().map(|(x, y)| (x.as_slice(), y.as_slice()));

@@ -3,9 +3,10 @@
 One camera and one target are the simple case, and go the same way.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import NotRequired, TypedDict
 
 import numpy as np
 
@@ -41,8 +42,16 @@ ROUGH_RAD, USUAL_NOISE_RAD = float(np.deg2rad(0.15)), float(np.deg2rad(0.03))
 NOT_DESCRIBED_POWER = 0.65
 # Components of the error whose constants belong to the arm.
 OF_ARM = frozenset({"joint_offsets", "links"})
+# Levels that residuals show, whatever is believed of what hides.
+SHOWN_OF_PICTURES = frozenset({"camera_inflation", "board_scale"})
+SHOWN_OF_ROBOT = frozenset({"flange_rad", "flange_lever_m", "base_rad", "base_lever_m", "joint_rad"})
 
 Start = tuple[FloatArray, FloatArray]
+
+
+class _Begin(TypedDict):
+    start: Start
+    levels: NotRequired[list[float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +161,11 @@ class CellFit:
             found[name] = Tip(tip.body, (x, y, z), max(largest, 0.0) ** 0.5)
         return found
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether poses and levels came to rest."""
+        return self.posterior.effort[2]
+
     @cached_property
     def rows_of_arm(self) -> list[int]:
         """Where the constants of the arm stand."""
@@ -216,7 +230,7 @@ def fit_cell(
         priors = {
             name: prior.moved(moved[name]) if name in moved else prior for name, prior in priors.items()
         }
-        fit = once(measurements, priors, start=_start(fit))
+        fit = once(measurements, priors, **_going_on(fit))
     unmirrored = {
         (camera, target): put_right
         for (camera, target), measured in measurements.pairs.items()
@@ -224,12 +238,12 @@ def fit_cell(
     }
     if unmirrored:
         measurements = measurements.with_pairs(unmirrored)
-        fit = once(measurements, priors, start=_start(fit))
+        fit = once(measurements, priors, **_going_on(fit))
     rough = roughness(fit.posterior, described=arm is not None)
     if rough == 1.0:
         return fit
     # Such an arm has play too, most likely: as much as the views show of it.
-    return once(measurements, priors, start=_start(fit), rough=rough, play=arm is not None)
+    return once(measurements, priors, rough=rough, play=arm is not None, **_going_on(fit))
 
 
 def roughness(posterior: _core.Posterior, *, described: bool) -> float:
@@ -260,8 +274,19 @@ def _behind(by_joint: FloatArray, joints: FloatArray) -> FloatArray:
     return -0.5 * (by_joint[:, :, np.newaxis, :] * both[:, np.newaxis]).reshape(len(joints), 6, -1)
 
 
-def _start(fit: CellFit) -> Start:
-    return np.asarray(fit.posterior.x), np.asarray(fit.posterior.y)
+def _going_on(fit: CellFit) -> _Begin:
+    """Return where the next fit begins.
+
+    Of several cameras with the levels that residuals showed, as their likelihood has more modes than one;
+    what hides begins by what is believed of it.
+    """
+    begin: _Begin = {"start": (np.asarray(fit.posterior.x), np.asarray(fit.posterior.y))}
+    if len(fit.measurements.pairs) > 1 and fit.at_rest:
+        found = zip(fit.posterior.level_names, fit.posterior.levels[0], strict=True)
+        begin["levels"] = [
+            level if name in SHOWN_OF_PICTURES | SHOWN_OF_ROBOT else float("nan") for name, level in found
+        ]
+    return begin
 
 
 def _once(
@@ -273,6 +298,7 @@ def _once(
     touched: ProbingRows | None,
     play: bool,
     rough: float = 1.0,
+    levels: Sequence[float] = (),
 ) -> CellFit:
     whole = measurements.whole
     if arm is not None:
@@ -338,6 +364,7 @@ def _once(
         touches=[] if touched is None else touched.touches,
         pairs=NODE_PAIRS,
         most_rounds=MOST_LINEARISATIONS,
+        levels=list(levels),
     )
     return CellFit(measurements, priors, pixels, arm, posterior, None if touched is None else touched.probing)
 

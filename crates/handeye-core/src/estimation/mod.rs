@@ -16,6 +16,7 @@ mod cell;
 mod cell_start;
 mod component;
 mod components;
+mod degrees_of_freedom;
 mod descent;
 mod explained;
 mod levels;

@@ -1,10 +1,11 @@
 //! From a cell to the answer: linearise, find the levels, move, and average over what the levels may be.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
+use nalgebra::{DMatrix, DVector, Matrix6xX};
 
 use super::cell::Cell;
 use super::component::Component;
 use super::components::{self, Assumptions};
+use super::degrees_of_freedom::degrees_of_freedom;
 use super::linearisation::{Guess, linearise};
 use super::mixed::{Evaluation, Mixed, Wanted};
 use super::nodes;
@@ -24,6 +25,9 @@ pub struct Options {
     pub pairs: usize,
     /// Most linearisations.
     pub most_rounds: usize,
+    /// Levels to begin with, in the order of [`Posterior::level_names`]; those that are not finite, and all that are
+    /// missing, begin as usual.
+    pub levels: Vec<f64>,
 }
 
 /// The model at one set of levels.
@@ -124,8 +128,8 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
     while rounds < options.most_rounds {
         rounds += 1;
         let found = match levels {
-            Some(levels) => find_mode(&mixed, levels)?,
-            None => first_mode(&mixed, cell.is_unseen())?,
+            Some(levels) => find_mode(&mixed, levels, &[])?,
+            None => first_mode(&mixed, &options.levels, cell.is_unseen())?,
         };
         steps += found.steps;
         let answer = answer_at(&mixed, &found.t)?;
@@ -142,7 +146,7 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
     }
     let found = match mode {
         Some(found) => found,
-        None => find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()))?,
+        None => find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()), &[])?,
     };
     let (nodes, at_mode) = average(&mixed, &found, options.pairs)?;
     let come = (rounds, steps, converged && found.at_rest);
@@ -196,20 +200,33 @@ pub(super) struct Mode {
 
 /// The mode of the levels before any is known.
 ///
+/// Where measurements of a station see each other free of the arm, an arm that is far off bends them as long as the poses
+/// are: until these are better, lenses and boards are taken as they are said to be.
+///
 /// Without pictures an error of the arm passes for one of the detector, and the likelihood can have a mode for either:
 /// the search begins small and large, and the better end counts.
-fn first_mode(mixed: &Mixed, unseen: bool) -> Result<Mode, Error> {
-    let small = find_mode(mixed, mixed.start())?;
+fn first_mode(mixed: &Mixed, levels: &[f64], unseen: bool) -> Result<Mode, Error> {
+    let mut start = mixed.start();
+    for (t, level) in start.iter_mut().zip(levels).filter(|(_, level)| level.is_finite()) {
+        *t = level.ln();
+    }
+    let of_pictures = mixed.components.iter().filter(|(name, _)| !components::is_of_robot(name));
+    let held: Vec<usize> = if mixed.settled.rows > 0 {
+        of_pictures.flat_map(|(_, range)| range.clone()).collect()
+    } else {
+        vec![]
+    };
+    let small = find_mode(mixed, start, &held)?;
     if !unseen {
         return Ok(small);
     }
-    let large = find_mode(mixed, mixed.large_start())?;
+    let large = find_mode(mixed, mixed.large_start(), &held)?;
     let steps = small.steps + large.steps;
     Ok(Mode { steps, ..if large.value < small.value { large } else { small } })
 }
 
-/// Newton's method on the levels, damped until the penalised likelihood falls.
-pub(super) fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Error> {
+/// Newton's method on the levels but those that are held, damped until the penalised likelihood falls.
+pub(super) fn find_mode(mixed: &Mixed, start: DVector<f64>, held: &[usize]) -> Result<Mode, Error> {
     let mut t = start;
     let mut now = mixed.evaluate(&t, Wanted::Slope).ok_or_else(singular)?;
     let mut damping = 1e-2;
@@ -220,7 +237,7 @@ pub(super) fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Erro
         steps += 1;
         let mut taken = false;
         for _ in 0..8 {
-            let step = damped_step(&now, damping);
+            let step = damped_step(&now, damping, held);
             let promised = -0.5 * step.dot(&now.slope);
             if promised < FLAT * 0.1 {
                 at_rest = true;
@@ -247,9 +264,15 @@ pub(super) fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Erro
 }
 
 /// Step of the levels by a curvature made positive.
-fn damped_step(now: &Evaluation, damping: f64) -> DVector<f64> {
-    let eigen = nalgebra::SymmetricEigen::new(now.curvature.clone());
-    let along = eigen.eigenvectors.tr_mul(&now.slope);
+fn damped_step(now: &Evaluation, damping: f64, held: &[usize]) -> DVector<f64> {
+    let (mut slope, mut curvature) = (now.slope.clone(), now.curvature.clone());
+    for l in held {
+        slope[*l] = 0.0;
+        curvature.row_mut(*l).fill(0.0);
+        curvature.column_mut(*l).fill(0.0);
+    }
+    let eigen = nalgebra::SymmetricEigen::new(curvature);
+    let along = eigen.eigenvectors.tr_mul(&slope);
     let scaled =
         DVector::from_fn(along.len(), |i, _| -along[i] / (eigen.eigenvalues[i].abs().max(0.05) + damping));
     let mut step = &eigen.eigenvectors * scaled;
@@ -300,9 +323,6 @@ fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<(Vec<Node>, Evalu
     }
     Ok((nodes, at_mode.ok_or_else(singular)?))
 }
-
-/// Fewest degrees of freedom: below, regions would have no useful quantile.
-const FEWEST_DEGREES_OF_FREEDOM: f64 = 4.5;
 
 fn gather(
     cell: &Cell,
@@ -362,38 +382,4 @@ fn attribution(mixed: &Mixed, mode: &Mode, theta: &DVector<f64>) -> Result<Vec<A
             Ok(Attribution { name, loss: without - mode.value, misfit })
         })
         .collect()
-}
-
-/// Degrees of freedom of a covariance that is known only so well.
-///
-/// A variance of `nu` degrees of freedom spreads by `2 / nu` in its logarithm. How much that of the nodes' covariances
-/// does is the mean over all directions, each in units of what is likeliest: of a symmetric matrix `A` the mean of
-/// `(u' A u)^2` over unit vectors in `n` dimensions is `(2 |A|^2 + tr(A)^2) / (n (n + 2))`.
-fn degrees_of_freedom(nodes: &[Node], block: impl Fn(&DMatrix<f64>) -> Matrix6<f64>) -> f64 {
-    let total: f64 = nodes.iter().map(|n| n.weight).sum();
-    let mean = |of: &dyn Fn(usize) -> Matrix6<f64>| -> Matrix6<f64> {
-        (0..nodes.len()).map(|i| of(i) * (nodes[i].weight / total)).sum()
-    };
-    let Some(unit) = mean(&|i| block(&nodes[i].covariance)).cholesky().and_then(|f| f.l().try_inverse())
-    else {
-        return FEWEST_DEGREES_OF_FREEDOM;
-    };
-    let logarithms: Vec<Matrix6<f64>> = nodes
-        .iter()
-        .map(|node| {
-            let mut eigen = (unit * block(&node.covariance) * unit.transpose()).symmetric_eigen();
-            eigen.eigenvalues.apply(|x| *x = x.max(f64::MIN_POSITIVE).ln());
-            eigen.recompose()
-        })
-        .collect();
-    let centre = mean(&|i| logarithms[i]);
-    let spread: f64 = logarithms
-        .iter()
-        .zip(nodes)
-        .map(|(a, node)| {
-            let away = a - centre;
-            node.weight * (2.0 * away.norm_squared() + away.trace().powi(2)) / 48.0
-        })
-        .sum();
-    (2.0 * total / spread.max(1e-12)).max(FEWEST_DEGREES_OF_FREEDOM)
 }

@@ -91,7 +91,13 @@ fn made(seed: u64, bodies: (&[Body], &[Body]), stations: usize, flange: f64, des
 }
 
 fn options(described: bool) -> Options {
-    Options { assumptions: assumptions(described), weak: WeakPrior::default(), pairs: 8, most_rounds: 8 }
+    Options {
+        assumptions: assumptions(described),
+        weak: WeakPrior::default(),
+        pairs: 8,
+        most_rounds: 8,
+        levels: vec![],
+    }
 }
 
 fn mixed_of(truth: &Truth, described: bool) -> Mixed {
