@@ -706,7 +706,7 @@ def estimate_cell(
     touches: Sequence[tuple[int, list[int], tuple[int, ArrayLike] | None, ArrayLike]] = ...,
     pairs: int,
     most_rounds: int,
-    levels: list[float] = ...,
+    levels: list[tuple[str, float]] = ...,
 ) -> Posterior:
     """The posterior of everything in a cell.
 
@@ -718,7 +718,7 @@ def estimate_cell(
     and (S, 6, m) per way of displacing a joint on its link, what a deviation of one means for each joint,
     joints whose offset is a parameter, and which ways are in metres. `approach` (S, 6, n): twists of the
     flange per joint and its play, by the side that it came from. `start`: X (C, 4, 4) and Y (T, 4, 4).
-    `levels` to begin with, in the order of `level_names`; those that are not finite begin as usual.
+    `levels` to begin with, by name, those of one name in order; others begin as usual.
     `roughness`: how many times larger hidden errors of the arm are believed to be than those of good arms.
     A tip is whether it is on the flange, where (3,), and how well that is known, information (3, 3); three
     parameters each behind those of the boards. A touch is its station, behind those of the pictures, one tip

@@ -294,7 +294,7 @@ fn estimate_cell<'py>(
     touches: Vec<TouchGiven<'py>>,
     pairs: usize,
     most_rounds: usize,
-    levels: Vec<f64>,
+    levels: Vec<(String, f64)>,
 ) -> PyResult<Posterior> {
     let poses = convert::transforms(py, "stations", &stations)?;
     let mut assumptions = Assumptions {

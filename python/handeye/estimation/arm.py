@@ -168,3 +168,16 @@ def velocities(measurements: Measurements) -> FloatArray | None:
 
 # Slower than this a lag between pictures and poses shows nothing.
 SLOWEST_M_S = 1e-3
+
+
+def behind(by_joint: FloatArray, joints: FloatArray) -> FloatArray:
+    """(K, 6, 2 n) twist of the flange per play of each joint, of twists per joint (K, 6, n) at joints (K, n).
+
+    A joint stands behind by half its play, on the side that it last came from. Of its side before it first
+    moves nobody knows: that is as large an error of its own, in the second half of the columns.
+    """
+    side = np.sign(np.diff(joints, axis=0, prepend=joints[:1]))
+    for k in range(1, len(side)):
+        side[k] = np.where(side[k] == 0.0, side[k - 1], side[k])
+    both = np.stack([side, side == 0.0], axis=1)
+    return -0.5 * (by_joint[:, :, np.newaxis, :] * both[:, np.newaxis]).reshape(len(joints), 6, -1)

@@ -11,7 +11,7 @@ from typing import NotRequired, TypedDict
 import numpy as np
 
 from handeye import _core
-from handeye.estimation.arm import ArmModel, velocities
+from handeye.estimation.arm import ArmModel, behind, velocities
 from handeye.estimation.camera_prior import CameraPrior, camera_prior
 from handeye.estimation.measurements import Measurements, ViewPose
 from handeye.estimation.probing import ProbingRows, probing_rows
@@ -43,15 +43,24 @@ NOT_DESCRIBED_POWER = 0.65
 # Components of the error whose constants belong to the arm.
 OF_ARM = frozenset({"joint_offsets", "links"})
 # Levels that residuals show, whatever is believed of what hides.
-SHOWN_OF_PICTURES = frozenset({"camera_inflation", "board_scale"})
-SHOWN_OF_ROBOT = frozenset({"flange_rad", "flange_lever_m", "base_rad", "base_lever_m", "joint_rad"})
+SHOWN = frozenset(
+    {
+        "camera_inflation",
+        "board_scale",
+        "flange_rad",
+        "flange_lever_m",
+        "base_rad",
+        "base_lever_m",
+        "joint_rad",
+    }
+)
 
 Start = tuple[FloatArray, FloatArray]
 
 
 class _Begin(TypedDict):
     start: Start
-    levels: NotRequired[list[float]]
+    levels: NotRequired[list[tuple[str, float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,19 +270,6 @@ def roughness(posterior: _core.Posterior, *, described: bool) -> float:
     return (noise / USUAL_NOISE_RAD) ** (1.0 if described else NOT_DESCRIBED_POWER)
 
 
-def _behind(by_joint: FloatArray, joints: FloatArray) -> FloatArray:
-    """(K, 6, 2 n) twist of the flange per play of each joint, of twists per joint (K, 6, n) at joints (K, n).
-
-    A joint stands behind by half its play, on the side that it last came from. Of its side before it first
-    moves nobody knows: that is as large an error of its own, in the second half of the columns.
-    """
-    side = np.sign(np.diff(joints, axis=0, prepend=joints[:1]))
-    for k in range(1, len(side)):
-        side[k] = np.where(side[k] == 0.0, side[k - 1], side[k])
-    both = np.stack([side, side == 0.0], axis=1)
-    return -0.5 * (by_joint[:, :, np.newaxis, :] * both[:, np.newaxis]).reshape(len(joints), 6, -1)
-
-
 def _going_on(fit: CellFit) -> _Begin:
     """Return where the next fit begins.
 
@@ -283,9 +279,7 @@ def _going_on(fit: CellFit) -> _Begin:
     begin: _Begin = {"start": (np.asarray(fit.posterior.x), np.asarray(fit.posterior.y))}
     if len(fit.measurements.pairs) > 1 and fit.at_rest:
         found = zip(fit.posterior.level_names, fit.posterior.levels[0], strict=True)
-        begin["levels"] = [
-            level if name in SHOWN_OF_PICTURES | SHOWN_OF_ROBOT else float("nan") for name, level in found
-        ]
+        begin["levels"] = [(name, level) for name, level in found if name in SHOWN]
     return begin
 
 
@@ -298,7 +292,7 @@ def _once(
     touched: ProbingRows | None,
     play: bool,
     rough: float = 1.0,
-    levels: Sequence[float] = (),
+    levels: Sequence[tuple[str, float]] = (),
 ) -> CellFit:
     whole = measurements.whole
     if arm is not None:
@@ -332,7 +326,7 @@ def _once(
         joints = whole.joints if touched is None else np.concatenate([whole.joints, touched.joints])
         by_joint, by_link = arm.at_flange(joints)
         if play:
-            approach = _behind(by_joint, joints)
+            approach = behind(by_joint, joints)
         of_arm = (by_joint, by_link, arm.scales.tolist(), list(arm.free), list(arm.lengths))
     cameras = [
         (

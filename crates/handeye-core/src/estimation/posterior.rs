@@ -25,9 +25,8 @@ pub struct Options {
     pub pairs: usize,
     /// Most linearisations.
     pub most_rounds: usize,
-    /// Levels to begin with, in the order of [`Posterior::level_names`]; those that are not finite, and all that are
-    /// missing, begin as usual.
-    pub levels: Vec<f64>,
+    /// Levels to begin with, by name, those of one name in order; others begin as usual.
+    pub levels: Vec<(String, f64)>,
 }
 
 /// The model at one set of levels.
@@ -205,10 +204,13 @@ pub(super) struct Mode {
 ///
 /// Without pictures an error of the arm passes for one of the detector, and the likelihood can have a mode for either:
 /// the search begins small and large, and the better end counts.
-fn first_mode(mixed: &Mixed, levels: &[f64], unseen: bool) -> Result<Mode, Error> {
+fn first_mode(mixed: &Mixed, levels: &[(String, f64)], unseen: bool) -> Result<Mode, Error> {
     let mut start = mixed.start();
-    for (t, level) in start.iter_mut().zip(levels).filter(|(_, level)| level.is_finite()) {
-        *t = level.ln();
+    let mut left: Vec<_> = levels.iter().collect();
+    for (t, level) in start.iter_mut().zip(&mixed.levels) {
+        if let Some(i) = left.iter().position(|(name, _)| name == level.name) {
+            *t = left.remove(i).1.ln();
+        }
     }
     let of_pictures = mixed.components.iter().filter(|(name, _)| !components::is_of_robot(name));
     let held: Vec<usize> = if mixed.settled.rows > 0 {
