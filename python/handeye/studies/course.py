@@ -28,6 +28,8 @@ SHRINK = (1.0, 0.75, 0.5, 0.35, 0.25)
 EMPTY = Workspace(np.full(3, -2.0), np.full(3, 2.0), floor_m=-2.0, link_radius_m=0.0, tool_radius_m=0.0)
 # Goals from which the target was not seen, at most, for each view.
 MISSES = 3
+# Where `tool_point` wants to be right: so far ahead of the camera, where a part would lie.
+TOOL_POINTS_M = ((0.0, 0.0, 0.5),)
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def planned(
     pool = course.pool if offered is None else Pool(tuple(_lattice(offered, course, most=None)))
     options = PlannerOptions(
         policy=make_policy(policy),
-        criterion=_core.Criterion(criterion),
+        criterion=_core.Criterion(criterion, tool_points=_tool_points(criterion)),
         sight=Sight(known=True),
         seed=int(course.random.integers(2**31)),
     )
@@ -127,8 +129,15 @@ def together(objective: str, course: Course) -> list[Candidate]:
     """Choose all views at once after the start."""
     estimate = course.estimator()(course.measure(course.start))
     count = course.budget - len(course.start)
-    plan = plan_batch(estimate, course.pool, count, objective=objective, sight=Sight(known=True))
+    points = _tool_points(objective)
+    plan = plan_batch(
+        estimate, course.pool, count, objective=objective, tool_points_m=points, sight=Sight(known=True)
+    )
     return list(plan.candidates)
+
+
+def _tool_points(criterion: str) -> tuple[tuple[float, ...], ...] | None:
+    return TOOL_POINTS_M if criterion == "tool_point" else None
 
 
 def lattice(name: str, course: Course) -> list[Candidate]:
@@ -157,6 +166,13 @@ def _lattice(name: str, course: Course, most: int | None) -> list[Candidate]:
 # The row that is ours: what `handeye run` does.
 OURS = "handeye_run"
 
+# Rows that choose all their views together after the start, and what each makes most of.
+BATCHES = {
+    "batch": "entropy",
+    "batch, hand-eye entropy": "entropy_handeye",
+    "batch, tool point": "tool_point",
+}
+
 # Rows of this package's model and criteria; the others are what the field does.
 OF_OURS: dict[str, PolicyRow] = {
     OURS: partial(driven, "next_best_view", Wish),
@@ -165,8 +181,13 @@ OF_OURS: dict[str, PolicyRow] = {
     "next_best_view, hand-eye entropy": partial(
         planned, "next_best_view", "entropy_handeye", ModelName.AUTO, None
     ),
-    "batch": partial(together, "entropy"),
-    "batch, hand-eye entropy": partial(together, "entropy_handeye"),
+    **{
+        f"next_best_view, {name.replace('_', ' ')}": partial(
+            planned, "next_best_view", name, ModelName.AUTO, None
+        )
+        for name in ("trace", "eigenvalue_sum", "min_eigenvalue", "tool_point")
+    },
+    **{name: partial(together, objective) for name, objective in BATCHES.items()},
 }
 
 POLICY_ROWS: dict[str, PolicyRow] = {
@@ -181,4 +202,4 @@ POLICY_ROWS: dict[str, PolicyRow] = {
 }
 
 # Rows that choose all their views together; the others choose one after another.
-AT_ONCE = ("batch", "batch, hand-eye entropy", "easy_handeye_17", "serpentine", "human")
+AT_ONCE = (*BATCHES, "easy_handeye_17", "serpentine", "human")
