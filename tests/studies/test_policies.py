@@ -9,7 +9,8 @@ from handeye import _core
 from handeye.compute.checkpoint import Checkpoint
 from handeye.errors import InputError
 from handeye.robots.simulated import ArmErrors
-from handeye.studies.gains import QUANTITIES, GainScatter, study_gains
+from handeye.studies.gains import QUANTITIES, GainScatter, reliability, study_gains
+from handeye.studies.gains_picture import draw_gains
 from handeye.studies.lattices import LATTICES
 from handeye.studies.measured_cell import MeasuredCell, measured_cell
 from handeye.studies.policies import OURS, POLICY_ROWS, study_policies
@@ -77,11 +78,32 @@ def test_a_correlation_is_that_of_the_mean_over_the_draws() -> None:
     gains = random.uniform(1, 4, 40)
     noise = random.normal(0, 6, (40, 400))
     found = dict.fromkeys(QUANTITIES, tuple(map(tuple, (gains[:, None] + noise).tolist())))
-    scatter = GainScatter({"entropy": tuple(gains), "entropy_handeye": tuple(-gains)}, found)
-    expected, single = scatter.correlations("entropy", "log_error")
-    assert expected > 0.9
-    assert 0.05 < single < 0.3
-    assert scatter.correlations("entropy_handeye", "rmse_px")[0] < -0.9
+    predicted = {"entropy": tuple(gains), "entropy_handeye": tuple(-gains)}
+    scatter = GainScatter(predicted, predicted, found)
+    told = scatter.correlations("entropy", "log_error")
+    assert told["expected"] > 0.9
+    assert 0.05 < told["single"] < 0.3
+    assert told["mean_gain"] == pytest.approx(told["expected"])
+    assert scatter.correlations("entropy_handeye", "rmse_px")["expected"] < -0.9
+
+
+def test_a_correlation_is_corrected_for_the_noise_that_is_left_in_the_means() -> None:
+    random = np.random.default_rng(6)
+    gains = random.uniform(1, 4, 400)
+    # Half of what candidates bring is told by the gain; the start of a draw is common to all of them.
+    brought = gains + random.normal(0, np.std(gains), 400)
+    noise = random.normal(0, 8, (400, 50)) + random.normal(0, 40, 50)
+    found = brought[:, None] + noise
+    assert reliability(found) == pytest.approx(np.var(brought) / (np.var(brought) + 64 / 50), abs=0.1)
+    scatter = GainScatter(
+        {"entropy": tuple(gains)},
+        {"entropy": tuple(-gains)},
+        {"log_error": tuple(map(tuple, found.tolist()))},
+    )
+    told = scatter.correlations("entropy", "log_error")
+    assert told["expected"] < 0.62
+    assert told["corrected"] == pytest.approx(np.sqrt(0.5), abs=0.06)
+    assert told["mean_gain"] == pytest.approx(-told["expected"])
 
 
 def test_gains_are_paired_with_what_candidates_bring(tmp_path: Path) -> None:
@@ -90,6 +112,8 @@ def test_gains_are_paired_with_what_candidates_bring(tmp_path: Path) -> None:
     again = study_gains(trials=1, candidates=4, draws=2, arm="exact", workers=kept).to_dict()
     assert again == document
     assert (document["starts"], document["candidates"], document["draws"]) == (1, 4, 2)
+    assert [len(start["expected"]) for start in document["points"]] == [4]
+    draw_gains(document)
     for part in document["correlation"].values():
         assert all(-1 <= found["expected_median"] <= 1 for found in part.values())
     with pytest.raises(InputError, match="2 candidates"):

@@ -108,7 +108,8 @@ def gains(
             progress=advance,
         )
     document = result.to_dict()
-    written = write_results(trials.output, f"gains_{mounting.value}_{arm.value}", document, lambda: ())
+    name = f"gains_{mounting.value}_{arm.value}"
+    written = write_results(trials.output, name, document, lambda: _gains_picture(name, document))
     return Answer(document, lambda console: _show_gains(console, document, written))
 
 
@@ -116,6 +117,12 @@ def _policies_picture(name: str, document: dict[str, Any]) -> "list[tuple[str, F
     from handeye.studies.policies_picture import draw_policies  # noqa: PLC0415 - only where one is asked for
 
     return [(name, draw_policies(document))]
+
+
+def _gains_picture(name: str, document: dict[str, Any]) -> "list[tuple[str, Figure]]":
+    from handeye.studies.gains_picture import draw_gains  # noqa: PLC0415 - only where one is asked for
+
+    return [(name, draw_gains(document))]
 
 
 def _show_policies(console: "Console", document: dict[str, Any], written: list[Path]) -> None:
@@ -158,13 +165,15 @@ def _show_gains(console: "Console", document: dict[str, Any], written: list[Path
     )
     for criterion, part in document["correlation"].items():
         table = _table(criterion.replace("_", " "))
-        for column in ("expected", "quartiles", "single draws"):
+        for column in ("expected", "quartiles", "corrected", "of the mean gain", "single draws"):
             table.add_column(column, justify="right")
         for quantity, found in part.items():
             table.add_row(
                 quantity.replace("_", " "),
                 f"{found['expected_median']:.2f}",
                 f"{found['expected_lower_quartile']:.2f} to {found['expected_upper_quartile']:.2f}",
+                f"{found['corrected_median']:.2f}",
+                f"{found['mean_gain_median']:.2f}",
                 f"{found['single_median']:.2f}",
             )
         console.print(table)

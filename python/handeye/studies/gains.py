@@ -21,12 +21,16 @@ from handeye.planning.prediction import Sight, gains
 from handeye.studies.measured_cell import MeasuredCell, measured_cell
 from handeye.studies.policies import ARMS, start_of
 from handeye.types import Mounting
+from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
 from handeye.validation import metrics
 
 CRITERIA = ("entropy", "entropy_handeye")
 CANDIDATES, DRAWS, HELD_OUT = 25, 50, 20
 QUANTITIES = ("log_translation", "log_rotation", "log_error", "rmse_px")
+# What the picture shows: the gain for the hand-eye, and what it speaks of.
+SHOWN = ("entropy_handeye", "log_error")
+SMALLEST_RELIABILITY = 1e-3
 # First number of the steps that are held out: their noise is that of no other view.
 HELD_OUT_STEP = 1000
 
@@ -38,21 +42,58 @@ class GainScatter:
     Parameters
     ----------
     gains
-        (N,) by criterion.
+        (N,) by criterion, as the estimate of the first draw predicts them.
+    mean_gains
+        (N,) by criterion: the mean of what the estimates of all draws predict; their starts differ in noise.
     reductions
         (N, D) by quantity: the natural logarithm of the error of the camera's centre, of its rotation, and
         the mean of the two; and the RMSE on held-out views, px.
     """
 
     gains: dict[str, tuple[float, ...]]
+    mean_gains: dict[str, tuple[float, ...]]
     reductions: dict[str, tuple[tuple[float, ...], ...]]
 
-    def correlations(self, criterion: str, quantity: str) -> tuple[float, float]:
-        """Pearson's correlation of the gain with the mean over the draws, and the mean of that with each."""
+    def correlations(self, criterion: str, quantity: str) -> dict[str, float]:
+        """Pearson's correlations of predicted gains with what candidates brought.
+
+        `expected`: with the mean over the draws. `corrected`: as with a mean of infinitely many (Spearman's
+        correction for attenuation). `mean_gain`: of the mean gain, with the mean over the draws. `single`:
+        the mean of those with each draw.
+        """
         predicted, found = np.array(self.gains[criterion]), np.array(self.reductions[quantity])
-        expected = float(np.corrcoef(predicted, found.mean(axis=1))[0, 1])
-        single = [float(np.corrcoef(predicted, column)[0, 1]) for column in found.T]
-        return expected, float(np.mean(single))
+        expected = _correlation(predicted, found.mean(axis=1))
+        return {
+            "expected": expected,
+            "corrected": min(1.0, expected / np.sqrt(reliability(found))),
+            "mean_gain": _correlation(np.array(self.mean_gains[criterion]), found.mean(axis=1)),
+            "single": float(np.mean([_correlation(predicted, column) for column in found.T])),
+        }
+
+    def points(self, criterion: str, quantity: str) -> dict[str, list[float]]:
+        """Return the gain of each candidate, what it brought in the mean and in the first draw."""
+        found = np.array(self.reductions[quantity])
+        return {
+            "gain": list(self.gains[criterion]),
+            "expected": found.mean(axis=1).tolist(),
+            "single": found[:, 0].tolist(),
+        }
+
+
+def _correlation(one: FloatArray, other: FloatArray) -> float:
+    return float(np.corrcoef(one, other)[0, 1])
+
+
+def reliability(found: FloatArray) -> float:
+    """Return the share of the variance of the means over draws (N, D) that is the candidates' own.
+
+    What all candidates of a draw have in common, the noise of its start, changes no difference between them.
+    """
+    count = found.shape[1]
+    means = found.mean(axis=1)
+    rest = found - means[:, np.newaxis] - found.mean(axis=0) + found.mean()
+    noise = np.sum(rest**2) / ((len(found) - 1) * (count - 1)) / count
+    return max(1.0 - float(noise / np.var(means, ddof=1)), SMALLEST_RELIABILITY)
 
 
 @dataclass(frozen=True)
@@ -79,17 +120,16 @@ class Gains:
                 criterion: {quantity: self._summary(criterion, quantity) for quantity in QUANTITIES}
                 for criterion in CRITERIA
             },
+            "points": [start.points(*SHOWN) for start in self.starts],
         }
 
     def _summary(self, criterion: str, quantity: str) -> dict[str, float]:
-        both = np.array([start.correlations(criterion, quantity) for start in self.starts])
-        expected, single = both.T
-        low, high = np.percentile(expected, [25, 75])
+        found = [start.correlations(criterion, quantity) for start in self.starts]
+        low, high = np.percentile([one["expected"] for one in found], [25, 75])
         return {
-            "expected_median": float(np.median(expected)),
+            **{f"{name}_median": float(np.median([one[name] for one in found])) for name in found[0]},
             "expected_lower_quartile": float(low),
             "expected_upper_quartile": float(high),
-            "single_median": float(np.median(single)),
         }
 
 
@@ -140,14 +180,9 @@ def _run(job: _Job) -> GainScatter:
     start, pool = start_of(cell, job.number, job.seed)
     offered, held_out = pool.candidates[: job.candidates], pool.candidates[job.candidates :]
     estimator = make_estimator(job.model, cell.kinematics if job.model is ModelName.AUTO else None)
-    measured = _taken(cell, start, 0)
-    estimate = estimator(measured)
     motions = np.array([job.mounting.chain(one.T_base_flange).matrix for one in offered])
     joints = np.array([one.joints_rad for one in offered])
-    predicted = {
-        name: gains(estimate, _core.Criterion(name), motions, Sight(known=True), joints=joints)
-        for name in CRITERIA
-    }
+    predicted: dict[str, list[FloatArray]] = {name: [] for name in CRITERIA}
     judged = cell.empty().with_views(
         [
             cell.measure(one.joints_rad or (), HELD_OUT_STEP + k, f"held_out_{k}")
@@ -159,6 +194,8 @@ def _run(job: _Job) -> GainScatter:
     for draw in range(job.draws):
         begun = _taken(cell, start, draw)
         before = estimator(begun)
+        for name, drawn in predicted.items():
+            drawn.append(gains(before, _core.Criterion(name), motions, Sight(known=True), joints=joints))
         first = _quality(before, cell, judged)
         for k, one in enumerate(offered):
             view = cell.measure(one.joints_rad or (), len(start), one.name, draw)
@@ -170,7 +207,8 @@ def _run(job: _Job) -> GainScatter:
                 reductions[quantity][k, draw] = first[quantity] - value
     # Plain numbers, which a checkpoint keeps.
     return GainScatter(
-        {name: tuple(gains.tolist()) for name, gains in predicted.items()},
+        {name: tuple(drawn[0].tolist()) for name, drawn in predicted.items()},
+        {name: tuple(np.mean(drawn, axis=0).tolist()) for name, drawn in predicted.items()},
         {name: tuple(map(tuple, found.tolist())) for name, found in reductions.items()},
     )
 
