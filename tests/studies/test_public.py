@@ -18,9 +18,13 @@ from handeye.simulation.mujoco_pictures import MujocoPictures
 from handeye.studies import kinhec, rendered_cell
 from handeye.studies.data import load_sets
 from handeye.studies.halves import study_halves
+from handeye.studies.public_picture import draw_errors, groups_of
 from handeye.studies.scale import study_scale
-from handeye.studies.table1_parts import study_table1_parts
+from handeye.studies.table1_parts import study_real_parts, study_table1_parts
 from handeye.types import Camera, Chessboard, Mounting
+
+POLICIES = ("next best view", "random", "max distance")
+ERRORS = ("translation_mm", "rotation_deg")
 
 
 def test_the_cameras_of_the_cell_stand_where_they_were_published() -> None:
@@ -158,6 +162,30 @@ def test_table_1_is_taken_apart(data_folder: Path) -> None:
     assert set(document["rows"]) == {"printed", "opencv_corners", "our_corners", "default"}
     assert document["factor_of_corners"] > 2
     assert document["factor_of_camera"] > 2
+    # Sets without truth are judged by views held out; any set will do.
+    real = study_real_parts(data_folder, recordings, trials=1)["CS_synthetic_1"]
+    assert set(real) == {"opencv_corners", "our_corners", "default"}
+    for row in real.values():
+        assert set(row) == {"next_best_view", "random", "max_distance", "halves"}
+    assert real["default"]["halves"]["translation_mm"] < real["opencv_corners"]["halves"]["translation_mm"]
+    titles = list(groups_of("sets", {**document, "real": {"CS_synthetic_1": real}}))
+    assert titles == [*(f"Table I, {name}" for name in POLICIES), "CS_synthetic_1, views held out"]
+
+
+def test_every_part_is_drawn_whatever_it_has_rows_of() -> None:
+    row, nothing = {"translation_mm": 1.0, "rotation_deg": 0.1}, dict.fromkeys(ERRORS)
+    cell = groups_of("cell", {arm: {"wrist": row, "wide": row} for arm in ("exact", "realistic")})
+    assert {title: list(rows) for title, rows in cell.items()} == {
+        "wrist camera": ["exact arm", "realistic arm"],
+        "wide camera": ["exact arm", "realistic arm"],
+    }
+    tracks = groups_of("kinhec", {"tracks": {"pnp": {"solvers": {"shah": row, "handeye": nothing}}}})
+    assert list(tracks) == ["KinHEC pnp"]
+    for groups in (cell, tracks, groups_of("folder", {"name": "mine", "methods": {"shah": row}})):
+        figure = draw_errors(groups)
+        assert len(figure.axes) == 2 * len(groups)
+        drawn = sum(len(axis.lines) for axis in figure.axes)
+        assert drawn == 2 * sum(found is row for rows in groups.values() for found in rows.values())
 
 
 def test_the_clock_of_a_sequence_is_found() -> None:

@@ -16,7 +16,12 @@ from handeye.codes import Code
 from handeye.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.figure import Figure
     from rich.console import Console
+
+    from handeye.types import Recording
 
 
 class PublicPart(StrEnum):
@@ -45,7 +50,8 @@ def public(
 ) -> Answer:
     """Compare on cells and data that others made.
 
-    sets: the paper's table I taken apart, on the sets of Ali et al. kinhec: tracks of poses through KinHEC's
+    sets: the paper's table I taken apart, on the sets of Ali et al., and the same rows on their real ones.
+    kinhec: tracks of poses through KinHEC's
     own benchmark, beside its solvers. cell: MoveIt Pro's cell rebuilt and rendered by MuJoCo, exact arm
     and realistic one. folder: every method on a folder of your own, by how well halves of its views agree.
 
@@ -69,7 +75,8 @@ def public(
         "versions": versions(),
         "parts": {part.value: _part(part, kinhec, tracks, most, folder, data, trials) for part in parts},
     }
-    written = write_results(trials.output, "public", document, lambda: ())
+    name = "_".join(["public", *(part.value for part in parts)])
+    written = write_results(trials.output, name, document, lambda: _pictures(document["parts"]))
     return Answer(document, lambda console: _show(console, document, written))
 
 
@@ -115,19 +122,36 @@ def _part(
 
 
 def _sets(data: Data, trials: Trials) -> dict[str, Any]:
-    from handeye.studies.data import SIMULATED_SETS, data_folder  # noqa: PLC0415
-    from handeye.studies.table1_parts import study_table1_parts  # noqa: PLC0415
+    from handeye.studies.data import REAL_SETS, SIMULATED_SETS, data_folder  # noqa: PLC0415
+    from handeye.studies.table1_parts import study_real_parts, study_table1_parts  # noqa: PLC0415
 
-    recordings = data.load(SIMULATED_SETS, trials.processes)
-    with progress("Calibrating from random starts") as advance:
-        return study_table1_parts(
-            data_folder(data.data),
-            recordings,
-            trials=trials.count(20),
-            seed=trials.seed,
-            workers=trials.crew,
-            progress=advance,
-        ).to_dict()
+    folder = data_folder(data.data)
+    recordings = data.load([*SIMULATED_SETS, *REAL_SETS], trials.processes)
+    count, seed, crew = trials.count(20), trials.seed, trials.crew
+    found: dict[str, Any] = {"seed": seed, "trials_per_set": count, "real": {}}
+    known, real = ([one for one in recordings if _has_truth(one) is truth] for truth in (True, False))
+    if known:
+        with progress("Calibrating from random starts") as advance:
+            result = study_table1_parts(
+                folder, known, trials=count, seed=seed, workers=crew, progress=advance
+            )
+        found |= result.to_dict()
+    if real:
+        with progress("Calibrating with views held out") as advance:
+            parts = study_real_parts(folder, real, trials=count, seed=seed, workers=crew, progress=advance)
+        found["real"] = parts
+    return found
+
+
+def _has_truth(recording: "Recording") -> bool:
+    return recording.truth is not None and recording.truth.X is not None
+
+
+def _pictures(parts: Mapping[str, Mapping[str, Any]]) -> "Iterator[tuple[str, Figure]]":
+    from handeye.studies.public_picture import draw_errors, groups_of  # noqa: PLC0415 - only where asked for
+
+    for part, found in parts.items():
+        yield f"public_{part}", draw_errors(groups_of(part, found))
 
 
 def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> None:
@@ -136,10 +160,7 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
 
     for part, found in document["parts"].items():
         if part == PublicPart.SETS:
-            heading(console, "Table I taken apart", "next best view, mean error after 3 + 5 views")
-            _table(console, "row", {row: one["next_best_view"] for row, one in found["rows"].items()})
-            corners, camera = found["factor_of_corners"], found["factor_of_camera"]
-            console.print(f"factor of our corners {corners:.1f}, of a camera that may move {camera:.1f}")
+            _show_sets(console, found)
         elif part == PublicPart.CELL:
             for arm, cameras in found.items():
                 heading(console, f"MoveIt Pro's cell, rendered, arm {arm}", "median of the starts, 8 views")
@@ -159,6 +180,21 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
             heading(console, found["name"], evidence)
             _table(console, "method", found["methods"])
     tables.show_written(console, written)
+
+
+def _show_sets(console: "Console", found: Mapping[str, Any]) -> None:
+    from handeye.cli.wording import heading  # noqa: PLC0415 - JSON need not wait for it
+
+    if "rows" in found:
+        heading(console, "Table I taken apart", "next best view, mean error after 3 + 5 views")
+        _table(console, "row", {row: one["next_best_view"] for row, one in found["rows"].items()})
+        corners, camera = found["factor_of_corners"], found["factor_of_camera"]
+        console.print(f"factor of our corners {corners:.1f}, of a camera that may move {camera:.1f}")
+    for name, rows in found["real"].items():
+        heading(console, name, "next best view, mean error on the views held out after 3 + 5")
+        _table(console, "row", {row: one["next_best_view"] for row, one in rows.items()})
+        heading(console, name, "mean difference of the answers from disjoint halves")
+        _table(console, "row", {row: one["halves"] for row, one in rows.items()})
 
 
 def _table(

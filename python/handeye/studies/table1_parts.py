@@ -2,7 +2,8 @@
 
 The same protocol, 3 random views and 5 more by each policy, on the simulated sets of Ali et al. (2019): with
 OpenCV's corners and camera in the paper's model, with our corners in the same model, and with the default.
-The robot poses of these sets carry no noise, so nothing here is about the arm.
+The robot poses of these sets carry no noise, so nothing there is about the arm. Their real sets have no
+truth: there the same three rows are judged by a third of the views, held out, and by how well halves agree.
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from handeye.datasets.images import read_image
 from handeye.errors import InputError
 from handeye.studies.comparison import Comparison, SetResult, compare, piece_count, pooled
 from handeye.studies.data import find_set
+from handeye.studies.holdout import study_holdout
 from handeye.studies.protocol import Protocol
 from handeye.types import Camera, Chessboard, Recording, View
 from handeye.types.calibration import ModelName
@@ -87,12 +89,7 @@ def study_table1_parts(
         A set is missing, or its target is no chessboard.
     """
     protocol = Protocol(trials=trials, seed=seed)
-    theirs = [with_opencv_corners(one, find_set(folder, one.name)) for one in recordings]
-    cases = (
-        ("opencv_corners", theirs, ModelName.PAPER),
-        ("our_corners", recordings, ModelName.PAPER),
-        ("default", recordings, ModelName.AUTO),
-    )
+    cases = _cases(folder, recordings)
     count = piece_count(len(recordings), protocol)
     rows: dict[str, tuple[SetResult, ...]] = {}
     for number, (name, sets, model) in enumerate(cases):
@@ -100,6 +97,62 @@ def study_table1_parts(
         comparison = Comparison(protocol, model)
         rows[name] = tuple(compare(sets, comparison, workers=workers, progress=told))
     return Table1Parts(seed, trials, rows)
+
+
+def study_real_parts(
+    folder: Path,
+    recordings: Sequence[Recording],
+    *,
+    trials: int = 20,
+    seed: int = 0,
+    workers: Workers = 1,
+    progress: Progress | None = None,
+) -> dict[str, dict[str, Any]]:
+    """Run the same three rows on sets without truth; return means by set and row.
+
+    Parameters
+    ----------
+    folder
+        Folder that holds the sets of the recordings.
+
+    Raises
+    ------
+    InputError
+        A set is missing, its target is no chessboard, or it has too few views.
+    """
+    cases = _cases(folder, recordings)
+    found: dict[str, dict[str, Any]] = {one.name: {} for one in recordings}
+    for number, (row, sets, model) in enumerate(cases):
+        result = study_holdout(sets, model=model, trials=trials, seed=seed, workers=workers)
+        for name, one in result.to_dict()["sets"].items():
+            found[name][row] = {
+                **{
+                    policy: {
+                        "translation_mm": part["relative_translation_mm"]["mean"],
+                        "rotation_deg": part["relative_rotation_deg"]["mean"],
+                    }
+                    for policy, part in one["policies"].items()
+                },
+                "halves": {
+                    "translation_mm": one["split_half_translation_mm"]["mean"],
+                    "rotation_deg": one["split_half_rotation_deg"]["mean"],
+                },
+            }
+        if progress is not None:
+            progress(number + 1, len(cases))
+    return found
+
+
+def _cases(
+    folder: Path, recordings: Sequence[Recording]
+) -> tuple[tuple[str, Sequence[Recording], ModelName], ...]:
+    """Return the rows: their name, the recordings, the model."""
+    theirs = [with_opencv_corners(one, find_set(folder, one.name)) for one in recordings]
+    return (
+        ("opencv_corners", theirs, ModelName.PAPER),
+        ("our_corners", recordings, ModelName.PAPER),
+        ("default", recordings, ModelName.AUTO),
+    )
 
 
 def with_opencv_corners(recording: Recording, place: Path) -> Recording:
