@@ -147,7 +147,11 @@ def test_halves_of_a_folder_agree_by_every_method() -> None:
 
 
 def test_scale_gives_the_same_answers_in_every_way() -> None:
-    document = study_scale(trials=40, processes=2, cluster=False).to_dict()
+    document = study_scale(trials=80, processes=2, cluster=False).to_dict()
+    assert {name: way["trials"] for name, way in document["ways"].items()} == {
+        "one_process": 40,
+        "processes": 80,
+    }
     assert set(document["ways"]) == {"one_process", "processes"}
     assert all(way["same_to_the_bit"] for way in document["ways"].values())
     assert document["resume"]["same_to_the_bit"] is True
