@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handeye.detection import Detection, NotFound, Prediction, Reason, detect
+from handeye.detection import Detection, NotFound, Prediction, Reason, charuco, detect
 from handeye.detection.part import Part, jacobians, mapped
 from handeye.detection.predicted import where_expected
 from handeye.detection.registration import drawn
@@ -212,3 +212,12 @@ def test_parts_map_places_and_shapes() -> None:
     np.testing.assert_allclose(part.shapes(places, round_shapes), 9 * J @ J.swapaxes(1, 2))
     half = Part.whole(np.zeros((40, 60), dtype=np.uint8), 0.5)
     np.testing.assert_allclose(half.places(np.array([[0.0, 0.0]])), [[0.5, 0.5]])
+
+
+def test_a_marker_without_extent_gives_no_corner_and_no_warning() -> None:
+    squares = np.kron(np.indices((10, 10)).sum(axis=0) % 2 * 200, np.ones((20, 20))).astype(np.uint8)
+    target = Charuco(5, 7, 0.035, 0.026, "DICT_4X4_50")
+    steps = np.array([np.eye(2) * 20 / 0.035, np.zeros((2, 2))])
+    fits = charuco._measured(squares, target, np.array([[99.4, 99.6], [59.5, 59.5]]), steps)
+    np.testing.assert_allclose(fits.places[0], 99.5, atol=1e-3)
+    assert np.isnan(fits.places[1]).all()

@@ -196,8 +196,10 @@ def _measured(
 ) -> CornerFits:
     """Return the corners (N) as fitted; `bends` (N, 2) are the curvatures of the edges along both axes."""
     lengths = np.linalg.norm(steps, axis=2)
-    directions = steps / lengths[:, :, np.newaxis]
-    sine = np.abs(np.linalg.det(directions))
+    # Where a marker's corners coincide there are no directions: NaN, which is never fitted.
+    with np.errstate(invalid="ignore"):
+        directions = steps / lengths[:, :, np.newaxis]
+        sine = np.abs(np.linalg.det(directions))
     scale = lengths.min(axis=1) * sine  # pixels per metre across the edges
     free = (target.square_m - target.marker_m) / 2
     return corner_fits(
