@@ -5,14 +5,18 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from handeye.studies.picture_style import INK, light_grid
+from handeye.studies.picture_style import INK, light_grid, plain_ticks
 from handeye.studies.table1_parts import PRINTED
 
 QUANTITIES = {"translation_mm": "mm", "rotation_deg": "deg"}
 OURS = ("default", "handeye", "exact arm", "realistic arm")
 OURS_COLOUR, OTHERS_COLOUR = "#0072B2", "#D98200"
+
+# Ticks in every decade, where the scale spans less than one of them and where it spans more.
+FEW_DECADES, NEAR, FAR = 1.0, (1, 1.5, 2, 3, 4, 5, 7), (1, 3)
 
 Rows = Mapping[str, Mapping[str, Any]]
 
@@ -57,6 +61,9 @@ def draw_errors(groups: Mapping[str, Rows]) -> Figure:
                     colour = OURS_COLOUR if name in OURS else OTHERS_COLOUR
                     axis.plot(value, place, "o", color=colour, markersize=4)
             axis.set_xscale("log")
+            low, high = axis.get_xlim()
+            steps = NEAR if np.log10(high / low) < FEW_DECADES else FAR
+            plain_ticks(axis.xaxis, [step * 10.0**decade for decade in range(-7, 5) for step in steps])
             labels = [name.replace("_", " ") for name in names] if column == 0 else [""] * len(names)
             axis.set_yticks(range(len(names)), labels, fontsize=7)
             axis.invert_yaxis()
