@@ -83,8 +83,13 @@ impl Posterior {
     /// Degrees of freedom of the covariance of six linear combinations of the parameters.
     #[must_use]
     pub fn degrees_of_freedom_of(&self, combinations: &Matrix6xX<f64>) -> f64 {
-        degrees_of_freedom(&self.nodes, |all| combinations * all * combinations.transpose())
+        degrees_of_freedom(shares(&self.nodes), |all| combinations * all * combinations.transpose())
     }
+}
+
+/// Share and covariance of each node.
+fn shares(nodes: &[Node]) -> impl Iterator<Item = (f64, &DMatrix<f64>)> {
+    nodes.iter().map(|node| (node.weight, &node.covariance))
 }
 
 /// What a component of the error explains.
@@ -347,7 +352,7 @@ fn gather(
     }
     covariance = (&covariance + covariance.transpose()) * 0.5;
     let degrees_of_freedom = (0..cell.cameras.len())
-        .map(|c| degrees_of_freedom(&nodes, |all| all.fixed_view::<6, 6>(6 * c, 6 * c).into_owned()))
+        .map(|c| degrees_of_freedom(shares(&nodes), |all| all.fixed_view::<6, 6>(6 * c, 6 * c).into_owned()))
         .collect();
     let moved = guess.moved(theta.as_slice());
     let poses = 6 * (cell.cameras.len() + cell.targets.len());
