@@ -21,6 +21,7 @@ mod kinematics;
 mod model;
 mod planar_pose;
 mod planning;
+mod posterior;
 mod problem;
 
 #[pymodule]
@@ -31,6 +32,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     camera::register(module)?;
     closed_form::register(module)?;
     estimation::register(module)?;
+    posterior::register(module)?;
     geometry::register(module)?;
     kinematics::register(module)?;
     imaging::register(module)?;
