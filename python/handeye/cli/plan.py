@@ -1,10 +1,10 @@
 """`handeye plan`: which view to take next, from those recorded or from poses in a file."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -16,10 +16,11 @@ from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.page import Page, serve, show_views
+from handeye.cli.plan_answer import Planned, plan_data, show_plan
 from handeye.cli.plan_rig import plan_rig
-from handeye.cli.plan_together import Together, check_together, choose_together, show_together, together_data
+from handeye.cli.plan_together import check_together, choose_together
 from handeye.cli.source import Source, mindful_of
-from handeye.cli.work import WorkOptions, check_touch, height_of, touch_lines
+from handeye.cli.work import WorkOptions, check_touch, height_of
 from handeye.codes import Code
 from handeye.datasets import read_poses
 from handeye.errors import InputError
@@ -28,17 +29,16 @@ from handeye.estimation.estimate import answering
 from handeye.estimation.initialize import check_views
 from handeye.estimation.work import Work, touch_where_possible
 from handeye.importing import Opened, is_rig
-from handeye.planning import Candidate, Planner, PlannerOptions, Pool, Prospect, Ranking, rank
+from handeye.planning import Candidate, Planner, PlannerOptions, Pool, rank
 from handeye.planning.prediction import Sight
 from handeye.planning.touch import touch_criterion
 from handeye.robots import ArmKinematics
 from handeye.session.deciding import Considered
 from handeye.types.calibration import ModelName
-from handeye.types.touch import TouchMap
 from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    pass
 
 # Views that count as taken where nothing is said, and candidates that the text shows.
 FIRST = 3
@@ -55,21 +55,6 @@ class Criterion(StrEnum):
     MIN_EIGENVALUE = "min_eigenvalue"
     TOOL_POINT = "tool_point"
     TOUCH = "touch"
-
-
-@dataclass(frozen=True, eq=False)
-class _Plan:
-    """Everything that is shown."""
-
-    recording: str
-    criterion: str
-    used: tuple[str, ...]
-    warnings: tuple[str, ...]
-    estimate: Estimate
-    touch: TouchMap | None
-    touch_mm: float | None
-    ranking: Ranking
-    batch: Together | None
 
 
 def plan(
@@ -207,7 +192,7 @@ def plan(
     # The planner leaves out what is taken; a person may wonder where it is.
     again = {name: "a view of this name is taken already" for name in taken if name in _names(pool)}
     ranking = replace(ranking, infeasible=ranking.infeasible | again)
-    found = _Plan(
+    found = Planned(
         opened.recording.name,
         criterion.value if estimate.determined else worth.name,
         taken,
@@ -218,18 +203,18 @@ def plan(
         ranking,
         batch,
     )
-    data = _data(found)
+    data = plan_data(found)
     if output is not None:
         write_json(output, data)
     after = None if not page.ui else partial(_page, page, opened, start, found, pool, kinematics, arm.robot)
-    return Answer(data, lambda console: _show(console, found, top or SHOWN), after)
+    return Answer(data, lambda console: show_plan(console, found, top or SHOWN), after)
 
 
 def _page(
     page: Page,
     opened: Opened,
     taken: Measurements,
-    found: _Plan,
+    found: Planned,
     pool: Pool,
     kinematics: ArmKinematics | None,
     description: str | None,
@@ -315,92 +300,3 @@ def _taken(
             hint="let fewer count as taken with --first or --used, or give poses with --candidates",
         )
     return taken
-
-
-def _data(found: _Plan) -> dict[str, Any]:
-    estimate = found.estimate
-    covariance = estimate.hand_eye_covariance
-    return {
-        "recording": found.recording,
-        "mounting": estimate.mounting.value,
-        "model": estimate.model.value,
-        "criterion": found.criterion,
-        "used": list(found.used),
-        "sigma_translation_mm": MM_PER_M * float(np.sqrt(np.trace(covariance[:3, :3]))),
-        "sigma_rotation_deg": float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:])))),
-        "determined": estimate.determined,
-        "touch": None if found.touch is None else found.touch.to_dict(),
-        "touch_mm": found.touch_mm,
-        "touch_met": found.touch_mm is not None
-        and found.touch is not None
-        and found.touch.worst_m * MM_PER_M <= found.touch_mm,
-        "unobservable": [direction.to_dict() for direction in estimate.unobservable],
-        "feasible_count": found.ranking.feasible_count,
-        "ranking": [_prospect(number, p) for number, p in enumerate(found.ranking.prospects, start=1)],
-        "together": None if found.batch is None else together_data(found.batch),
-        "infeasible": [{"name": name, "reason": why} for name, why in found.ranking.infeasible.items()],
-        "warnings": list(found.warnings),
-    }
-
-
-def _prospect(number: int, prospect: Prospect) -> dict[str, Any]:
-    return {
-        "rank": number,
-        "name": prospect.candidate.name,
-        "gain": prospect.gain,
-        "sigma_translation_mm": MM_PER_M * prospect.sigma_translation_m,
-        "sigma_rotation_deg": float(np.rad2deg(prospect.sigma_rotation_rad)),
-        "T_base_flange": prospect.candidate.T_base_flange.to_list(),
-    }
-
-
-def _show(console: "Console", found: _Plan, shown: int) -> None:
-    from rich import box  # noqa: PLC0415 - a program reading JSON need not wait for it
-    from rich.table import Table  # noqa: PLC0415
-
-    from handeye.cli.wording import (  # noqa: PLC0415
-        MOUNTINGS,
-        both,
-        figures,
-        heading,
-        notices,
-        open_directions,
-        pairs,
-    )
-
-    data, estimate, ranking = _data(found), found.estimate, found.ranking
-    heading(
-        console,
-        found.recording,
-        f"{MOUNTINGS[estimate.mounting]}, {len(found.used)} views taken, model {estimate.model}, "
-        f"criterion {found.criterion}",
-    )
-    now = both(data["sigma_translation_mm"] / MM_PER_M, np.deg2rad(data["sigma_rotation_deg"]))
-    known = f"{now} (one standard deviation)" if estimate.determined else "not determined yet, see below"
-    if found.touch is not None:
-        pairs(console, touch_lines(found.touch))
-    if found.touch_mm is not None:
-        met = "is reached" if data["touch_met"] else "is not reached yet"
-        console.print(f"The touch error asked for, {found.touch_mm:g} mm wherever in the box, {met}.")
-    console.print(f"Now: {known}. Predicted after one more view:\n")
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("rank", justify="right")
-    table.add_column("view" if ranking.prospects else "no view can be taken")
-    for name in ("gain", "sigma mm", "sigma deg"):
-        table.add_column(name, justify="right")
-    for number, prospect in enumerate(ranking.prospects[:shown], start=1):
-        millimetres = figures(MM_PER_M * prospect.sigma_translation_m)
-        degrees = figures(float(np.rad2deg(prospect.sigma_rotation_rad)), 2)
-        row = (str(number), prospect.candidate.name, f"{prospect.gain:.3f}", millimetres, degrees)
-        table.add_row(*row, style="bold" if number == 1 else "")
-    console.print(table)
-    beyond = ranking.feasible_count - min(shown, len(ranking.prospects))
-    if beyond > 0:
-        console.print(f"and {beyond} more (--top shows them)")
-    if data["together"] is not None:
-        show_together(console, data["together"])
-    cannot = [f"{name}: {why}" for name, why in ranking.infeasible.items()]
-    more = [f"and {len(cannot) - shown} more (--json lists them)"] if len(cannot) > shown else []
-    notices(console, "Cannot be taken", [*cannot[:shown], *more])
-    open_directions(console, estimate.unobservable)
-    notices(console, "Warnings", found.warnings)
