@@ -100,8 +100,9 @@ def test_a_run_that_fails_ends_in_words_and_can_be_resumed(handeye: Handeye, tmp
     outcome = handeye(
         "run", "--session", tmp_path / "cell", "--points-only", "0.1", "--faults", "1", "--json"
     )
-    assert outcome.code == 8
-    assert outcome.error["code"] == "too_many_failures"
+    assert outcome.code == 5
+    assert outcome.error["code"] == "no_start"
+    assert outcome.error["message"].startswith("nothing comes of the first view, where the arm stands: ")
     assert "--resume" in outcome.error["hint"]
 
 

@@ -4,7 +4,8 @@ import numpy as np
 
 from handeye.estimation import Measurements
 from handeye.estimation.auto import AutoEstimator, AutoOptions
-from handeye.estimation.cell_fit import _behind, fit_cell, roughness
+from handeye.estimation.arm import behind
+from handeye.estimation.cell_fit import fit_cell, roughness
 from handeye.estimation.rig_measurements import RigMeasurements
 from handeye.robots import ArmKinematics
 from handeye.simulation.cells import ErrorKind, simulate, simulated_arm
@@ -40,7 +41,7 @@ def test_play_is_found_where_the_arm_is_rough() -> None:
 def test_of_the_side_before_a_joint_first_moves_nobody_knows() -> None:
     """Behind by half the play, on the side that the joint last came from; a joint that rests stays there."""
     by_joint = np.ones((4, 6, 2))
-    found = _behind(by_joint, np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.5, 0.5]]))
+    found = behind(by_joint, np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.5, 0.5]]))
     known, unknown = found[:, 0, :2], found[:, 0, 2:]
     np.testing.assert_array_equal(known, [[0, 0], [-0.5, 0], [-0.5, -0.5], [0.5, -0.5]])
     np.testing.assert_array_equal(unknown, [[-0.5, -0.5], [0, -0.5], [0, 0], [0, 0]])

@@ -252,7 +252,8 @@ def fit_cell(
     if rough == 1.0:
         return fit
     # Such an arm has play too, most likely: as much as the views show of it.
-    return once(measurements, priors, rough=rough, play=arm is not None, **_going_on(fit))
+    found = _going_on(fit, many_modes=True)
+    return once(measurements, priors, rough=rough, play=arm is not None, **found)
 
 
 def roughness(posterior: _core.Posterior, *, described: bool) -> float:
@@ -270,14 +271,14 @@ def roughness(posterior: _core.Posterior, *, described: bool) -> float:
     return (noise / USUAL_NOISE_RAD) ** (1.0 if described else NOT_DESCRIBED_POWER)
 
 
-def _going_on(fit: CellFit) -> _Begin:
+def _going_on(fit: CellFit, *, many_modes: bool = False) -> _Begin:
     """Return where the next fit begins.
 
-    Of several cameras with the levels that residuals showed, as their likelihood has more modes than one;
-    what hides begins by what is believed of it.
+    Where the likelihood has more modes than one, as of several cameras or of rough arms, with the levels that
+    residuals showed; what hides begins by what is believed of it.
     """
     begin: _Begin = {"start": (np.asarray(fit.posterior.x), np.asarray(fit.posterior.y))}
-    if len(fit.measurements.pairs) > 1 and fit.at_rest:
+    if (many_modes or len(fit.measurements.pairs) > 1) and fit.at_rest:
         found = zip(fit.posterior.level_names, fit.posterior.levels[0], strict=True)
         begin["levels"] = [(name, level) for name, level in found if name in SHOWN]
     return begin
