@@ -3,8 +3,8 @@
 import numpy as np
 
 from handeye.estimation import Measurements
-from handeye.estimation.auto import AutoEstimator, AutoOptions
 from handeye.estimation.arm import behind
+from handeye.estimation.auto import AutoEstimator, AutoOptions
 from handeye.estimation.cell_fit import fit_cell, roughness
 from handeye.estimation.rig_measurements import RigMeasurements
 from handeye.robots import ArmKinematics
