@@ -165,11 +165,12 @@ def ros2(arguments: argparse.Namespace, seed: int) -> Iterator[tuple[Shown, str,
         yield Shown("ur5e", seed=seed), "ros2:base=base,flange=flange", "ur5e"
 
 
-def of_the_bag(cell: Shown, folder: Path) -> Pose | None:
+def of_the_bag(cell: Shown, folder: Path, arm: str) -> Pose | None:
     """Return what the bag of a session is solved to; None where it is not."""
     printed = io.StringIO()
     command = ["solve", str(folder / "bag"), "--target", str(folder / "target.toml"), "--json"]
     command += ["--base-frame", "base", "--flange-frame", "flange", "--mounting", cell.mounting.value]
+    command += ["--robot", arm, "--pose-topic", "/joint_states"]
     with redirect_stdout(printed):
         run(command)
     answer = json.loads(printed.getvalue())
@@ -204,7 +205,7 @@ def calibrated(arguments: argparse.Namespace, seed: int, folder: Path) -> dict[s
     off = (truth @ T_flange_camera).log() if truth is not None else np.full(6, np.nan)
     bag: dict[str, float] = {}
     if arguments.robot == "ros2":
-        solved = of_the_bag(cell, folder)
+        solved = of_the_bag(cell, folder, arm)
         apart = np.full(6, np.nan) if solved is None else (solved.inverse() @ T_flange_camera).log()
         bag["bag_apart_mm"] = round(1e3 * float(np.linalg.norm(apart[:3])), 4)
         bag["bag_apart_deg"] = round(float(np.rad2deg(np.linalg.norm(apart[3:]))), 5)
