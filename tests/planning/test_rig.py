@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from handeye.errors import InputError
+from handeye.errors import DegenerateError, InputError
 from handeye.estimation import RigEstimate, RigMeasurements, estimate_rig
 from handeye.planning import rig
 from handeye.planning.candidates import Candidate, Pool
@@ -97,3 +97,12 @@ def test_an_empty_sight_gains_nothing(recording: RigRecording) -> None:
     before = estimated(recording, 8)
     away = Pool.of_poses([Pose.exp([5.0 + k, 5.0, 5.0, 0, 0, 0]) for k in range(5)])
     assert rig_gains(before, away, {}, Sight()).best is None
+
+
+@pytest.mark.parametrize("between", [1.0, 2.0])
+def test_information_that_is_not_positive_definite_is_refused(between: float) -> None:
+    """Two parameters that cannot be told apart, and what no measurement gives."""
+    information = np.eye(7)
+    information[0, 6] = information[6, 0] = between
+    with pytest.raises(DegenerateError, match="singular"):
+        rig._log_sizes(information[np.newaxis], np.eye(6, 7)[np.newaxis])

@@ -225,10 +225,13 @@ def _log_sizes(informations: FloatArray, combinations: FloatArray) -> FloatArray
     """(N, C) logarithms of the determinants of the covariances of combinations (C, 6, n)."""
     scale = 1 / np.sqrt(np.diag(informations[0]))
     rows = combinations * scale
-    solved = np.linalg.solve(informations * scale[:, None] * scale, rows.reshape(-1, len(scale)).T)
+    try:
+        solved = np.linalg.solve(informations * scale[:, None] * scale, rows.reshape(-1, len(scale)).T)
+    except np.linalg.LinAlgError as error:
+        raise DegenerateError("the information of the stations is singular") from error
     blocks = rows @ np.swapaxes(solved.reshape(len(informations), len(scale), -1, 6), 1, 2)
     signs, logarithms = np.linalg.slogdet(blocks)
-    if np.any(signs <= 0):
+    if not np.all(signs > 0):
         raise DegenerateError("the information of the stations is singular")
     return logarithms
 
