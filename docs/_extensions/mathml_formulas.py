@@ -2,7 +2,8 @@
 
 A formula that cannot be converted is a warning that names the page and line, and so an error in `make docs`.
 Browsers stretch brackets only with a font made for mathematics, which few machines have: the brackets of a
-matrix are drawn as its borders instead (`formulas.css`), and others that would have to grow are refused.
+matrix are drawn as its borders instead (`formulas.css`), and others that would have to grow are refused; those of
+a stated size grow to what they hold where a font lets them. Bars around a value are its brackets, not operators.
 """
 
 import xml.etree.ElementTree as ET
@@ -19,6 +20,7 @@ from sphinx.writers.html5 import HTML5Translator
 logger = logging.getLogger(__name__)
 MATHML = "http://www.w3.org/1998/Math/MathML"
 BRACKETED = [f"{{{MATHML}}}{name}" for name in ("mo", "mtable", "mo")]
+VALUES = [f"{{{MATHML}}}{name}" for name in ("mi", "mn", "msub", "msup", "msubsup")]
 ET.register_namespace("", MATHML)
 
 
@@ -48,7 +50,16 @@ def draw_brackets(root: ET.Element) -> None:
                 matrix.set("class", "matrix")
                 parent.remove(opening)
                 parent.remove(closing)
+        bars = [part for part in parts if part.text == "|"]
+        if len(bars) % 2:
+            raise ValueError("a bar without its other one; write what is given with \\mid")
+        for number, bar in enumerate(bars):
+            bar.attrib |= {"form": ("prefix", "postfix")[number % 2], "lspace": "0", "rspace": "0"}
+        for number, (name, value) in reversed(list(enumerate(zip(parts, parts[1:], strict=False), 1))):
+            if name.tag == f"{{{MATHML}}}mi" and len(name.text or "") > 1 and value.tag in VALUES:
+                parent.insert(number, ET.Element(f"{{{MATHML}}}mspace", width="0.17em"))
     for operator in root.iter(f"{{{MATHML}}}mo"):
+        operator.attrib.pop("maxsize", None)
         if operator.get("fence") == "true" and operator.get("stretchy") == "true":
             raise ValueError(
                 f"a bracket that browsers do not stretch: {operator.text}; write it without \\left"
