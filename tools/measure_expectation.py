@@ -2,7 +2,7 @@
 
     .venv/bin/python tools/measure_expectation.py --cells 50 --first-seed 980000
 
-Five kinds of cells, so 250 with 50 each, of seeds that the prediction does not use. Prints the mean error
+Six kinds of cells, so 300 with 50 each, of seeds that the prediction does not use. Prints the mean error
 foretold and reached after 6, 9 and 12 views (mm, deg), and the ratio of the two.
 """
 
@@ -11,37 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from handeye.robots.simulated import ArmErrors
-from handeye.session.settings import Configuration, Simulation
-from handeye.session.simulated import usual_errors
 from handeye.studies.expectation import expect, reached
+from handeye.studies.questions import AskedCell
 from handeye.types import Chessboard, Mounting, Target
 
 VIEWS = (6, 9, 12)
-
-
-def cell(
-    robot: str = "epson_c4l",
-    pixel_sigma: float = 0.05,
-    arm_errors: float = 1.0,
-    mounting: Mounting = Mounting.EYE_IN_HAND,
-) -> Configuration:
-    """Return a kind of cell."""
-    errors = ArmErrors(**{name: arm_errors * value for name, value in vars(usual_errors()).items()})
-    return Configuration(
-        robot,
-        mounting=mounting,
-        most_views=VIEWS[-1],
-        simulation=Simulation(errors=errors, points_only=pixel_sigma),
-    )
-
-
-KINDS: dict[str, tuple[Configuration, Target | None]] = {
-    "an arm in good order": (cell(), None),
-    "another arm, three times as wrong": (cell("ur5e", arm_errors=3.0), None),
-    "an exact arm, points off by 0.2 px": (cell(pixel_sigma=0.2, arm_errors=0.0), None),
-    "a board of half the size": (cell(), Chessboard(6, 8, 0.01)),
-    "a camera beside the arm": (cell(mounting=Mounting.EYE_TO_HAND), None),
+KINDS: dict[str, tuple[AskedCell, Target | None]] = {
+    "an arm in good order": (AskedCell(), None),
+    "another arm, three times as wrong": (AskedCell("ur5e", arm_errors=3.0), None),
+    "an exact arm, points off by 0.2 px": (AskedCell(pixel_sigma=0.2, arm_errors=0.0), None),
+    "a board of half the size": (AskedCell(), Chessboard(6, 8, 0.01)),
+    "a camera beside the arm": (AskedCell(mounting=Mounting.EYE_TO_HAND), None),
+    "a fisheye": (AskedCell(lens="fisheye"), None),
 }
 
 
@@ -53,7 +34,8 @@ def main() -> None:
     parser.add_argument("--only", help="part of the name of a kind")
     parser.add_argument("--foretold-only", action="store_true", help="do not drive the cells to compare with")
     asked = parser.parse_args()
-    for name, (configuration, target) in KINDS.items():
+    for name, (cell, target) in KINDS.items():
+        configuration = replace(cell.configuration(), most_views=VIEWS[-1])
         if asked.only is not None and asked.only not in name:
             continue
         foretold = expect(configuration, VIEWS, target=target)

@@ -307,6 +307,8 @@ def test_studies_of_work(handeye: Handeye) -> None:
     compare("handeye study probing", handeye.json("study", "probing", "--cells", "1", *one))
     few = ("--arms", "1", "--views", "9", "--postures", "20")
     compare("handeye study arm", handeye.json("study", "arm", *few, *one))
+    few = ("--only", "arm", "--cells", "1")
+    compare("handeye study questions", handeye.json("study", "questions", *few, *one))
     compare("handeye study cheap-arms", handeye.json("study", "cheap-arms", "--cells", "1", *one))
 
 

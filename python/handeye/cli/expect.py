@@ -1,27 +1,23 @@
 """`handeye expect`: what accuracy to expect of a cell before it is built."""
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
 from cyclopts import Parameter, validators
 
 from handeye.cli.answer import Answer
 from handeye.cli.options import Common
 from handeye.cli.progress import progress
-from handeye.cli.run_options import Simulated
 from handeye.cli.source import Board
 from handeye.codes import Code
 from handeye.errors import InputError
-from handeye.planning.constraints import ViewLimits
 from handeye.types import Mounting
-from handeye.types.units import MM_PER_M
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from handeye.studies.expectation import Expectation
 
+LensName = Literal["ordinary", "wide", "fisheye"]
 ViewCount = Annotated[int, Parameter(validator=validators.Number(gte=3, lte=200))]
 
 
@@ -34,16 +30,17 @@ def expect(
     mounting: Mounting = Mounting.EYE_IN_HAND,
     distance_mm: tuple[float, float] = (250.0, 900.0),
     tilt_deg: float = 45.0,
+    lens: LensName = "ordinary",
+    focal_px: float | None = None,
     cells: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1000))] | None = None,
     workers: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
     board: Board = Board(),  # noqa: B008 - frozen
     common: Common = Common(),  # noqa: ARG001, B008 - obeyed by the boundary
 ) -> Answer:
-    """Say what accuracy to expect from a board, distances, a number of views and an arm.
+    """Say what accuracy to expect from a board, distances, a number of views, a lens and an arm.
 
-    A few such cells are simulated and driven by the loop; beyond twelve views the planner's prediction takes
-    over. Nothing is read but the target and the arm. The camera is that of the simulated cell: 1280 x 1024
-    pixels, focal length 1400 px, with a good calibration.
+    Such cells are simulated and driven by the loop; beyond twelve views the planner's prediction takes over.
+    Nothing is read but the target and the arm. The camera has 1280 x 1024 pixels and a good calibration.
 
     Parameters
     ----------
@@ -62,31 +59,34 @@ def expect(
         Nearest and farthest distance from camera to target.
     tilt_deg
         Largest angle at which the target is seen.
+    lens
+        ordinary (focal length 1400 px, 49 degrees across), wide (780 px, 79 degrees) or fisheye (520 px, 141
+        degrees).
+    focal_px
+        Another focal length of that lens: that in mm over the size of a pixel in mm.
     cells
         Number of cells that are simulated; without it so many that their mean is known to about a fifteenth.
     workers
         Processes. The result does not depend on it.
     """
-    from handeye.session.settings import Configuration  # noqa: PLC0415 - help need not wait for it
-    from handeye.studies.expectation import CELLS  # noqa: PLC0415
+    from handeye.studies.expectation import CELLS  # noqa: PLC0415 - help need not wait for it
     from handeye.studies.expectation import expect as foretell  # noqa: PLC0415
+    from handeye.studies.questions import AskedCell  # noqa: PLC0415
 
     target, pattern = board.described()
     if pattern is not None:
         raise InputError(
             "--pitch-mm is missing", code=Code.MISSING_VALUE, hint="say how large the squares are"
         )
-    configuration = Configuration(
-        robot,
-        mounting=mounting,
-        limits=ViewLimits(
-            (distance_mm[0] / MM_PER_M, distance_mm[1] / MM_PER_M), float(np.deg2rad(tilt_deg)), 20.0
-        ),
-        simulation=replace(Simulated(arm_errors=arm_errors).simulation(), points_only=pixel_sigma),
-    )
+    asked = AskedCell(robot, arm_errors, pixel_sigma, mounting, distance_mm, tilt_deg, lens, focal_px)
     with progress("Simulating cells") as advance:
         found = foretell(
-            configuration, views, target=target, cells=cells or CELLS, workers=workers, progress=advance
+            asked.configuration(),
+            views,
+            target=target,
+            cells=cells or CELLS,
+            workers=workers,
+            progress=advance,
         )
     data = _data(found)
     return Answer(data, lambda console: _show(console, found))

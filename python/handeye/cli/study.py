@@ -67,6 +67,11 @@ study.command(
     name="gains",
     help="Tell what gains are worth, apart from noise.",
 )
+study.command(
+    "handeye.cli.study_questions:questions",
+    name="questions",
+    help="Tell what boards, distances, views, tilts, lenses and arms make of the accuracy.",
+)
 
 
 @study.command

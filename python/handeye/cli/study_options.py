@@ -24,11 +24,9 @@ if TYPE_CHECKING:
 
 @Parameter(name="*", group="Study")
 @dataclass(frozen=True)
-class Effort:
+class Work:
     """Who does the work of a study, and what is kept of it."""
 
-    seed: Seed = 0
-    """Seed of everything random."""
     workers: Annotated[int | None, Parameter(show_default=False)] = None
     """Processes; all processors by default. The results do not depend on it."""
     scheduler: Annotated[str | None, Parameter(show_default=False)] = None
@@ -61,6 +59,15 @@ class Effort:
 
             workers = Checkpoint(self.checkpoint, workers)
         return workers
+
+
+@Parameter(name="*", group="Study")
+@dataclass(frozen=True)
+class Effort(Work):
+    """The work of a study whose draws have a seed."""
+
+    seed: Seed = 0
+    """Seed of everything random."""
 
 
 @Parameter(name="*", group="Study")

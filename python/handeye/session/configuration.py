@@ -327,6 +327,7 @@ def _simulated(
         faults=wrong.faults,
         camera_error=wrong.camera_error,
         lens=wrong.lens,
+        focal_px=wrong.focal_px,
     )
     made = simulated_cell(arm, options)
     cell = made.cell

@@ -52,6 +52,7 @@ class Simulation:
     points_only: float | None = None
     camera_error: float = 1.0
     lens: str = ORDINARY
+    focal_px: float | None = None
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,8 @@ class SimulationOptions:
         What is looked at.
     lens
         One of `LENSES`.
+    focal_px
+        Another focal length of it; None for its own.
 
     Examples
     --------
@@ -72,6 +74,7 @@ class SimulationOptions:
     faults: FaultRates | None = None
     camera_error: float = 1.0
     lens: str = ORDINARY
+    focal_px: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +114,8 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
     ------
     SolveError
         The arm reaches no posture with its flange down in front of it.
+    InputError
+        As `usual_camera`.
 
     Examples
     --------
@@ -122,11 +127,10 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
     random = np.random.default_rng([options.seed, 0])
     workspace = surrounding(arm)
     T_base_flange, joints = looking_down(arm, workspace)
-    lens, parameters = _lens(options.lens)
-    sigmas = np.array(PARAMETER_SIGMAS[lens])
-    known = Camera(lens, parameters, *SIZE_PX, covariance=np.diag(np.square(sigmas)))
-    off = options.camera_error * sigmas * random.standard_normal(len(parameters))
-    true_camera = Camera(lens, np.array(parameters) + off, *SIZE_PX)
+    known = usual_camera(options.lens, options.focal_px)
+    sigmas = np.array(PARAMETER_SIGMAS[known.lens])
+    off = options.camera_error * sigmas * random.standard_normal(len(sigmas))
+    true_camera = Camera(known.lens, known.parameters + off, *SIZE_PX)
     truth = _mounted(random, options, T_base_flange)
     robot = SimulatedArm(arm, options.errors, options.seed, joints)
     X, Y = truth.X or Pose.identity(), truth.Y or Pose.identity()
@@ -154,10 +158,34 @@ def simulated_cell(arm: Arm, options: SimulationOptions | None = None) -> Simula
     return SimulatedCell(cell, Start(T_base_flange, joints), recording, truth, robot, true_camera)
 
 
-def _lens(name: str) -> tuple[str, tuple[float, ...]]:
-    if name not in LENSES:
-        raise InputError(f"lens {name!r}, expected one of {', '.join(LENSES)}", code=Code.UNKNOWN_LENS)
-    return LENSES[name]
+def usual_camera(lens: str = ORDINARY, focal_px: float | None = None) -> Camera:
+    """Return the camera of a simulated cell as a good calibration has it, with its covariance.
+
+    Parameters
+    ----------
+    lens
+        One of `LENSES`.
+    focal_px
+        Another focal length than its own.
+
+    Raises
+    ------
+    InputError
+        No such lens, or a focal length that is not above zero.
+
+    Examples
+    --------
+    >>> usual_camera("fisheye").lens
+    'kannala_brandt'
+    >>> float(usual_camera(focal_px=2000.0).parameters[0])
+    2000.0
+    """
+    if lens not in LENSES:
+        raise InputError(f"lens {lens!r}, expected one of {', '.join(LENSES)}", code=Code.UNKNOWN_LENS)
+    model, parameters = LENSES[lens]
+    if focal_px is not None:
+        parameters = (focal_px, focal_px, *parameters[2:])
+    return Camera(model, parameters, *SIZE_PX, covariance=np.diag(np.square(PARAMETER_SIGMAS[model])))
 
 
 # Postures drawn where arms of few joints reach none that is asked for, and of how many ways are tried.
