@@ -2,12 +2,13 @@
 
 A formula that cannot be converted is a warning that names the page and line, and so an error in `make docs`.
 Browsers stretch brackets only with a font made for mathematics, which few machines have: the brackets of a
-matrix are drawn as its borders instead (`formulas.css`), and others that would have to grow are refused; those of
-a stated size grow to what they hold where a font lets them. Bars around a value are its brackets, not operators.
+matrix are drawn as its borders instead (`formulas.css`), and others that would have to grow are refused; those
+of a stated size grow to what they hold where a font lets them.
 """
 
 import xml.etree.ElementTree as ET
 from html import escape
+from itertools import pairwise
 
 from docutils import nodes
 from latex2mathml.converter import convert
@@ -34,6 +35,7 @@ def to_mathml(node: nodes.Element, display: str) -> str:
         if unknown:
             raise ValueError(f"unknown command {unknown[0]}")
         draw_brackets(root)
+        give_room(root)
         return ET.tostring(root, encoding="unicode")
     except Exception as error:  # noqa: BLE001 - the converter raises many classes; each becomes a named warning
         logger.warning("formula not understood (%s): %s", error, latex, location=node)
@@ -50,20 +52,25 @@ def draw_brackets(root: ET.Element) -> None:
                 matrix.set("class", "matrix")
                 parent.remove(opening)
                 parent.remove(closing)
-        bars = [part for part in parts if part.text == "|"]
-        if len(bars) % 2:
-            raise ValueError("a bar without its other one; write what is given with \\mid")
-        for number, bar in enumerate(bars):
-            bar.attrib |= {"form": ("prefix", "postfix")[number % 2], "lspace": "0", "rspace": "0"}
-        for number, (name, value) in reversed(list(enumerate(zip(parts, parts[1:], strict=False), 1))):
-            if name.tag == f"{{{MATHML}}}mi" and len(name.text or "") > 1 and value.tag in VALUES:
-                parent.insert(number, ET.Element(f"{{{MATHML}}}mspace", width="0.17em"))
     for operator in root.iter(f"{{{MATHML}}}mo"):
         operator.attrib.pop("maxsize", None)
         if operator.get("fence") == "true" and operator.get("stretchy") == "true":
             raise ValueError(
                 f"a bracket that browsers do not stretch: {operator.text}; write it without \\left"
             )
+
+
+def give_room(root: ET.Element) -> None:
+    """Take bars for the brackets of a value, not for operators, and part the name of a function from its value."""
+    for parent in list(root.iter()):
+        bars = [part for part in parent if part.text == "|"]
+        if len(bars) % 2:
+            raise ValueError("a bar without its other one; write what is given with \\mid")
+        for number, bar in enumerate(bars):
+            bar.attrib |= {"form": ("prefix", "postfix")[number % 2], "lspace": "0", "rspace": "0"}
+        for number, (name, value) in reversed(list(enumerate(pairwise(parent), 1))):
+            if name.tag == f"{{{MATHML}}}mi" and len(name.text or "") > 1 and value.tag in VALUES:
+                parent.insert(number, ET.Element(f"{{{MATHML}}}mspace", width="0.17em"))
 
 
 def visit_inline(translator: HTML5Translator, node: nodes.math) -> None:
