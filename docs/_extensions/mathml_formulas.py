@@ -2,8 +2,8 @@
 
 A formula that cannot be converted is a warning that names the page and line, and so an error in `make docs`.
 Browsers stretch brackets only with a font made for mathematics, which few machines have: the brackets of a
-matrix are drawn as its borders instead (`formulas.css`), and others that would have to grow are refused; those
-of a stated size grow to what they hold where a font lets them.
+matrix are drawn as its borders instead (`formulas.css`), and others that would have to grow are refused;
+those of a stated size grow to what they hold where a font lets them.
 """
 
 import xml.etree.ElementTree as ET
@@ -61,7 +61,7 @@ def draw_brackets(root: ET.Element) -> None:
 
 
 def give_room(root: ET.Element) -> None:
-    """Take bars for the brackets of a value, not for operators, and part the name of a function from its value."""
+    """Take bars for brackets, not for operators; part the name of a function from its value."""
     for parent in list(root.iter()):
         bars = [part for part in parent if part.text == "|"]
         if len(bars) % 2:
