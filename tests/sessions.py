@@ -86,7 +86,7 @@ RIG = Configuration(
 def run_rig(configuration: Configuration, folder: Path) -> RigEnd:
     """Run a simulated rig to the end, from the beginning or from where it broke off."""
     if is_session(folder):
-        session, store, _ = go_on_rig(folder, rig_cell)
+        session, store, _ = go_on_rig(folder, lambda asked, *_: rig_cell(asked))
     else:
         session, store = begin_rig(rig_cell(configuration), folder)
     try:

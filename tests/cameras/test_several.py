@@ -65,13 +65,23 @@ def test_a_stop_that_was_given_up_leaves_nothing_behind(cameras: dict[str, Slow]
     eyes["left"].grab("station_01.1")
     assert grey(eyes["right"].grab("station_01.2")) == 12, "a frame of the stop before"
     cameras["front"].error = DeviceError("cable", code="no_image", hint="check the cable")
+    assert grey(eyes["left"].grab("station_02.1")) == 3, "the others keep theirs"
     with pytest.raises(DeviceError, match="camera front: cable") as caught:
-        eyes["left"].grab("station_02.1")
+        eyes["front"].grab("station_02.1")
     assert (caught.value.code, caught.value.hint) == ("no_image", "check the cable")
     cameras["front"].error = ValueError("nonsense")
     with pytest.raises(DeviceError, match="camera front: nonsense") as caught:
         rig.grab("station_02.2")
     assert caught.value.code == "driver_failed"
     cameras["front"].error = None
-    assert grey(eyes["left"].grab("station_02.1")) == 5
+    assert grey(eyes["left"].grab("station_02.3")) == 5
+    rig.close()
+
+
+def test_a_frame_is_given_once_for_each_target_looked_for(cameras: dict[str, Slow]) -> None:
+    rig = SeveralCameras(cameras)
+    eyes = rig.eyes(dict.fromkeys(cameras, 2))
+    asked = ["left", "left", "right", "front", "right", "front"]
+    assert [grey(eyes[name].grab("station_01.1")) for name in asked] == [1, 1, 11, 21, 11, 21]
+    assert grey(eyes["left"].grab("station_01.1")) == 2
     rig.close()

@@ -90,6 +90,18 @@ def test_plan_ranks_stations_by_what_all_cameras_learn(handeye: Handeye, folder:
     assert handeye.fails("plan", folder, "--together", "3")["exit_code"] == 2
 
 
+def test_plan_ranks_stations_by_the_touch_error(handeye: Handeye, folder: Path) -> None:
+    data = handeye.json("plan", folder, "--first", "8", "--touch-mm", "50")
+    assert set(data["touch"]) == set(data["within_95"])
+    assert data["touch_met"]
+    assert [c["name"] for c in data["candidates"]]
+    box = ["--work-box-mm", "4000", "4000", "0", "4100", "4100", "100"]
+    error = handeye.fails("plan", folder, "--first", "8", "--touch-mm", "0.01", *box)
+    assert error["code"] == "nothing_to_touch"
+    assert not handeye.json("plan", folder, "--first", "8", "--touch-mm", "0.01")["touch_met"]
+    assert handeye.fails("plan", folder, "--criterion", "trace")["exit_code"] == 2
+
+
 def test_other_commands_take_one_of_the_cameras(handeye: Handeye, folder: Path) -> None:
     error = handeye.fails("doctor", folder)
     assert error["code"] == "several_cameras"

@@ -45,7 +45,7 @@ def bench_default(options: Options, progress: Progress) -> dict[str, Any]:
             estimate_rig(of_rig, a)
         )
     believed, pool = estimate_rig(of_rig, kinematics), _candidates(rig, kinematics, options)
-    methods[f"plan_{len(rig.cameras)}_cameras_{len(pool)}_candidates"] = lambda: rig_gains(believed, pool, {})
+    methods[f"plan_{len(rig.cameras)}_cameras_{len(pool)}_candidates"] = lambda: rig_gains(believed, pool, ())
     shipped = read_recording(shipped_recording()).recording
     shipped = replace(shipped, views=shipped.views[: 8 if options.quick else None])
     methods[f"solve_shipped_{len(shipped.views)}_views"] = lambda: solve(shipped)

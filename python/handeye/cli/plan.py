@@ -135,12 +135,10 @@ def plan(
     if criterion is None:
         criterion = Criterion.ENTROPY if touch_mm is None else Criterion.TOUCH
     check_together(together, criterion)
-    if (criterion is Criterion.TOOL_POINT) != (tool_point_mm is not None):
-        raise UsageError("--criterion tool_point and --tool-point-mm go together")
+    _check_point(criterion, tool_point_mm)
     table = None if candidates is None else read_poses(candidates, source.stated())
     if source.only is None and is_rig(folder):
-        if together is not None or touch_mm is not None or page.ui or model is ModelName.PAPER:
-            raise UsageError("--together, --touch-mm, --ui and --model paper take one camera")
+        _check_rig(criterion, alone=together is not None or page.ui or model is ModelName.PAPER)
         rig = source.open_rig(folder)
         views = [station.views[0].view for station in rig.recording.stations]
         return plan_rig(
@@ -152,6 +150,8 @@ def plan(
             top=top,
             sight=Sight(margin_px=margin_px, fewest=fewest),
             kinematics=arm.kinematics(views, model),
+            work=work.work() if criterion is Criterion.TOUCH else None,
+            touch_mm=touch_mm,
         )
     opened = (source if table is None else source.of_a_recording(folder)).open(folder, arm.described())
     measurements = Measurements.of_recording(opened.recording)
@@ -260,6 +260,21 @@ def _criterion(
     if tool_point_mm is None:
         return _core.Criterion(name.value)
     return _core.Criterion(name.value, tool_points=np.array([tool_point_mm]) / MM_PER_M)
+
+
+def _check_rig(criterion: Criterion, *, alone: bool) -> None:
+    if alone:
+        raise UsageError("--together, --ui and --model paper take one camera")
+    if criterion not in {Criterion.ENTROPY, Criterion.TOUCH}:
+        raise UsageError(
+            f"--criterion {criterion.value} takes one camera",
+            hint="several are asked for their poses, or with --touch-mm for what they are used for",
+        )
+
+
+def _check_point(criterion: Criterion, tool_point_mm: tuple[float, float, float] | None) -> None:
+    if (criterion is Criterion.TOOL_POINT) != (tool_point_mm is not None):
+        raise UsageError("--criterion tool_point and --tool-point-mm go together")
 
 
 def _check(used: tuple[str, ...] | None, first: int | None, top: int | None) -> None:

@@ -15,7 +15,7 @@ from handeye.cli.output import check_new_folder
 from handeye.cli.page import Live, Page
 from handeye.cli.run_answer import judged_by, run_answer
 from handeye.cli.run_options import Lens, Limits, Rig, Simulated, TimeoutOptions
-from handeye.cli.run_rig import check_rig, resume_rig, run_rig
+from handeye.cli.run_rig import cell_of, check_rig, resume_rig, run_rig
 from handeye.cli.work import WorkOptions, check_touch, height_of
 from handeye.datasets import read_camera, read_target
 from handeye.estimation import Estimate
@@ -37,7 +37,6 @@ from handeye.session.prepared import Prepared
 from handeye.session.settings import SIMULATED, Configuration
 from handeye.session.starting import preview
 from handeye.session.store import SessionStore
-from handeye.studies.rig_cell import rig_cell
 from handeye.types import Mounting
 from handeye.types.calibration import ModelName
 from handeye.types.units import MM_PER_M
@@ -152,9 +151,11 @@ def run(
         driver = f"{REPLAY}:{Path(driver.partition(':')[2]).resolve()}"
     elif robot is None and driver == SIMULATED and not several.rig:
         robot = DEFAULT_ARM
+    given = (camera, target, mounting, images) != (None, None, None, None)
     robot = None if robot is None else _described(robot)
     if images is None:
-        images = REPLAY if replays else SIMULATED
+        # Each camera of a rig has its own.
+        images = REPLAY if replays else SIMULATED if several.rig_file is None else "rig"
     configuration = Configuration(
         robot=robot,
         driver=driver,
@@ -187,7 +188,7 @@ def run(
         rig=several.settings(),
         anyway=anyway,
     )
-    _check(configuration, given=(camera, target, mounting) != (None, None, None), dry_run=dry_run)
+    _check(configuration, given=given, dry_run=dry_run)
     if not dry_run:
         if session is None:
             hint = "name a folder to write, or look first with --dry-run"
@@ -195,7 +196,14 @@ def run(
         check_new_folder(session)
     front = _Front(page if not dry_run else Page(), configuration, confirm, as_json=common.json)
     if session is not None and configuration.rig is not None:
-        rig = rig_cell(configuration, confirm=front.confirm, observer=front.observer)
+        described = several.described()
+        rig = cell_of(
+            configuration,
+            None if described is None else described.recording,
+            person=front.person,
+            confirm=front.confirm,
+            observer=front.observer,
+        )
         return run_rig(session, rig, front.live)
     prepared = prepare(
         configuration,
@@ -243,7 +251,7 @@ def _resumed(session: Path, confirm: bool | None, page: Page, *, as_json: bool) 
     configuration = Configuration.from_dict(read_settings(session).asked.get("configuration"))
     front = _Front(page, configuration, confirm, as_json=as_json)
     if configuration.rig is not None:
-        return resume_rig(session, front.confirm, front.observer, front.person.tell, front.live)
+        return resume_rig(session, front.confirm, front.observer, front.person, front.live)
     loop, store, prepared = go_on(
         session, person=front.person, confirm=front.confirm, observer=front.observer
     )

@@ -1,11 +1,13 @@
 """Groups of options of `handeye run`: limits of motion, time-outs, and what is wrong in a simulated cell."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from handeye.cli.failures import UsageError
+from handeye.datasets import RigDescription, read_rig_description
 from handeye.session.attempt import Timeouts
 from handeye.session.drivers import MANUAL
 from handeye.session.faults import FaultRates
@@ -80,12 +82,17 @@ class Lens:
 @Parameter(name="*", group="Several cameras")
 @dataclass(frozen=True)
 class Rig:
-    """A simulated rig of several cameras and two boards; the accuracy is asked for of every camera."""
+    """Several cameras and boards at once; the accuracy, or --touch-mm, is asked for of every camera."""
 
     rig: bool = False
-    """Drive two cameras on the flange (left, right) and two beside the arm (front, side) at once."""
+    """Drive a simulated rig: two cameras on the flange (left, right), two beside the arm (front, side) and
+    two boards."""
+    rig_file: Path | None = None
+    """Drive a real rig with --robot and --driver: a TOML file with a table [[camera]] for each camera (name;
+    on = "flange" or "base"; images, its driver as for --images; calibration, its file) and a table [[target]]
+    for each board (name, on, board)."""
     cameras: Annotated[tuple[str, ...] | None, Parameter(consume_multiple=True)] = None
-    """Those that take part; all four by default."""
+    """Those that take part; all by default."""
     camera_to_camera_mm: float | None = None
     """Ask for cameras of one body in each other too: radius of their position."""
     camera_to_camera_deg: float | None = None
@@ -98,18 +105,34 @@ class Rig:
         ------
         UsageError
             Options that need others.
+        InputError
+            A file that describes no rig.
         """
-        radii = (self.camera_to_camera_mm, self.camera_to_camera_deg)
-        if not self.rig:
+        if not (self.rig or self.rig_file):
             if self != Rig():
-                raise UsageError("--cameras and --camera-to-camera need --rig")
+                raise UsageError("--cameras and --camera-to-camera need --rig or --rig-file")
             return None
-        mm, deg = radii
-        if mm is None and deg is None:
-            return RigSettings(self.cameras)
-        if mm is None or deg is None:
+        if self.rig and self.rig_file is not None:
+            raise UsageError("--rig is a simulated rig, and --rig-file a real one: expected one of them")
+        mm, deg = self.camera_to_camera_mm, self.camera_to_camera_deg
+        if (mm is None) != (deg is None):
             raise UsageError("--camera-to-camera-mm and --camera-to-camera-deg go together")
-        return RigSettings(self.cameras, (mm, deg))
+        described = self.described()
+        return RigSettings(
+            self.cameras,
+            None if mm is None or deg is None else (mm, deg),
+            images=None if described is None else dict(described.images),
+        )
+
+    def described(self) -> RigDescription | None:
+        """Return what the file says; None without one.
+
+        Raises
+        ------
+        InputError
+            It describes no rig.
+        """
+        return None if self.rig_file is None else read_rig_description(self.rig_file)
 
 
 @Parameter(name="*", group="Simulated cell")

@@ -9,15 +9,21 @@ from handeye.cli.failures import UsageError
 from handeye.cli.page import Live
 from handeye.cli.run_answer import found
 from handeye.estimation.confidence import Within
+from handeye.planning.rig_request import rig_touch_map
 from handeye.robots.protocol import Goal
+from handeye.session.closing import closing
 from handeye.session.deciding import EndReason
+from handeye.session.drivers import Person
 from handeye.session.observer import Observer
 from handeye.session.rig import RigEnd, RigSession
+from handeye.session.rig_devices import prepare_rig
 from handeye.session.rig_prepared import RigPrepared, begin_rig, go_on_rig
 from handeye.session.rig_store import RigStore
 from handeye.session.settings import Configuration
 from handeye.studies.rig_cell import rig_cell
 from handeye.studies.rig_loop import judged
+from handeye.types import RigRecording
+from handeye.types.calibration import ModelName
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -40,15 +46,32 @@ def check_rig(configuration: Configuration, *, given: bool, dry_run: bool) -> No
     UsageError
         It does not.
     """
-    if not configuration.is_simulated or given or configuration.touch_mm or not configuration.camera_known:
+    real = configuration.rig is not None and configuration.rig.images is not None
+    if real == configuration.is_simulated:
         raise UsageError(
-            "--rig drives a simulated rig: it has arm, cameras and targets of its own, and an accuracy is "
-            "asked for of every camera",
-            hint="leave the other options out; stations of a real rig are taken by its own program, then "
-            "handeye import, solve and plan take them all together",
+            "--rig drives a simulated rig, and --rig-file a real one with --robot and --driver",
+            hint="describe the cameras and targets of a real rig in a file, see handeye run --help",
         )
-    if dry_run or configuration.policy != Configuration.policy:
-        raise UsageError("--rig goes without --dry-run and --policy")
+    if given or not configuration.camera_known:
+        raise UsageError(
+            "a rig has cameras and targets of its own, which are calibrated",
+            hint="leave --camera, --target, --mounting, --images and --uncalibrated out",
+        )
+    if dry_run or configuration.policy != Configuration.policy or configuration.model is not ModelName.AUTO:
+        raise UsageError("several cameras go without --dry-run, --policy and --model")
+
+
+def cell_of(configuration: Configuration, recording: RigRecording | None, **world: Any) -> RigPrepared:  # noqa: ANN401
+    """Return the rig that is asked for: a simulated one, or that of a recording by its drivers.
+
+    Raises
+    ------
+    InputError, DeviceError
+        As for `prepare_rig` and `rig_cell`.
+    """
+    if recording is None or configuration.is_simulated:
+        return rig_cell(configuration, confirm=world.get("confirm"), observer=world.get("observer"))
+    return prepare_rig(configuration, recording, **world)
 
 
 def run_rig(folder: Path, prepared: RigPrepared, live: Live | None = None) -> Answer:
@@ -59,14 +82,16 @@ def run_rig(folder: Path, prepared: RigPrepared, live: Live | None = None) -> An
     HandeyeError
         It has no answer, or the folder cannot be written.
     """
-    return _answer(folder, *_run(*begin_rig(prepared, folder), prepared, live))
+    with closing(prepared.cell):
+        done = _run(*begin_rig(prepared, folder), prepared, live)
+    return _answer(folder, *done)
 
 
 def resume_rig(
     folder: Path,
     confirm: Callable[[Goal], bool] | None = None,
     observer: Observer | None = None,
-    tell: Callable[[str], None] | None = None,
+    person: Person | None = None,
     live: Live | None = None,
 ) -> Answer:
     """Go on with a session.
@@ -77,11 +102,16 @@ def resume_rig(
         As for `run_rig`; or the session was damaged.
     """
     session, store, prepared = go_on_rig(
-        folder, lambda asked: rig_cell(asked, confirm=confirm, observer=observer)
+        folder,
+        lambda asked, recording, start: cell_of(
+            asked, recording, person=person, confirm=confirm, start=start, observer=observer
+        ),
     )
-    if store.notice is not None and tell is not None:
-        tell(f"warning: {store.notice}")
-    return _answer(folder, *_run(session, store, prepared, live))
+    with closing(prepared.cell):
+        if store.notice is not None and person is not None:
+            person.tell(f"warning: {store.notice}")
+        done = _run(session, store, prepared, live)
+    return _answer(folder, *done)
 
 
 def _run(
@@ -98,13 +128,19 @@ def _run(
 
 def _answer(folder: Path, prepared: RigPrepared, end: RigEnd) -> Answer:
     calibration = found(end.calibration, (end.reason, end.sentence), folder, "stations")
-    run = judged(prepared, end)
+    run, asked = judged(prepared, end), prepared.configuration
 
     def told(name: str, within: Within) -> dict[str, Any]:
+        if prepared.truth is None:
+            return {"within_95": within.to_dict(), "true_error": None}
         error = {"translation_mm": run.error_mm[name], "rotation_deg": run.error_deg[name]}
         return {"within_95": within.to_dict(), "true_error": error}
 
     cameras = {name: told(name, calibration.estimate.of_camera(name).within_95) for name in run.cameras}
+    for name, one in cameras.items():
+        asked_for = asked.touch_mm is not None
+        touch = rig_touch_map(calibration.estimate, name, asked.work).to_dict() if asked_for else None
+        one["touch"] = touch
     between = {
         f"T_{a}_{b}": told(f"{a}_{b}", one.within_95) for (a, b), one in calibration.camera_to_camera.items()
     }
@@ -117,7 +153,7 @@ def _answer(folder: Path, prepared: RigPrepared, end: RigEnd) -> Answer:
         "attempts": end.attempts,
         "cameras": cameras,
         "camera_to_camera": between,
-        "seed": prepared.configuration.seed,
+        "seed": asked.seed,
         "calibration": calibration.to_dict(),
     }
 
@@ -126,9 +162,17 @@ def _answer(folder: Path, prepared: RigPrepared, end: RigEnd) -> Answer:
 
         heading(console, "accuracy reached" if data["request_met"] else "accuracy NOT reached", end.sentence)
         rows: list[tuple[str, str]] = []
-        for name, stated in run.stated_mm.items():
-            off = f"{figures(run.error_mm[name], 2)} mm and {figures(run.error_deg[name], 2)} deg"
-            rows.append((name, f"within {figures(stated, 2)} mm (95 %), off the truth by {off}"))
+        for name, one in {**cameras, **between}.items():
+            within = one["within_95"]
+            mm, deg = within["translation_mm"], within["rotation_deg"]
+            text = f"within {figures(mm, 2)} mm and {figures(deg, 2)} deg (95 %)"
+            if one.get("touch") is not None:
+                text += f", a touch within {figures(one['touch']['worst_mm'], 2)} mm"
+            if one["true_error"] is not None:
+                off = one["true_error"]
+                text += f", off the truth by {figures(off['translation_mm'], 2)} mm and "
+                text += f"{figures(off['rotation_deg'], 2)} deg"
+            rows.append((name, text))
         pairs(console, rows, indent=2)
         pairs(
             console,

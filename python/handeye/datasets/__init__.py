@@ -17,6 +17,7 @@ from handeye.datasets.read_back import check_written, check_written_rig
 from handeye.datasets.recording_format import LoadedRecording, read_recording
 from handeye.datasets.recording_header import holds_several
 from handeye.datasets.recording_writing import write_recording
+from handeye.datasets.rig_description import RigDescription, read_rig_description
 from handeye.datasets.rig_format import LoadedRig, read_rig, rig_warnings
 from handeye.datasets.rig_writing import write_rig
 
@@ -34,6 +35,7 @@ __all__ = [
     "PoseRows",
     "PoseTable",
     "Reading",
+    "RigDescription",
     "Shot",
     "Statement",
     "UnreadPoses",
@@ -47,6 +49,7 @@ __all__ = [
     "read_poses",
     "read_recording",
     "read_rig",
+    "read_rig_description",
     "read_target",
     "recording_warnings",
     "rig_warnings",

@@ -185,7 +185,14 @@ def recording_of(header: object) -> RigRecording:
     return _header(read_document(header, _RigDocument, "recording"))
 
 
-def _named(tables: list[dict[str, Any]], what: str) -> list[tuple[str, Body, dict[str, Any]]]:
+def named_tables(tables: list[dict[str, Any]], what: str) -> list[tuple[str, Body, dict[str, Any]]]:
+    """Return name, body and the other fields of tables of cameras or targets.
+
+    Raises
+    ------
+    InputError
+        A name that is missing or there twice, or something that hangs on neither flange nor base.
+    """
     found: list[tuple[str, Body, dict[str, Any]]] = []
     for number, table in enumerate(tables, 1):
         rest = dict(table)
@@ -204,11 +211,11 @@ def _header(document: _RigDocument) -> RigRecording:
     """Return the recording without its stations."""
     cameras = {
         name: MountedCamera(Camera.from_dict(rest), body)
-        for name, body, rest in _named(document.camera, "camera")
+        for name, body, rest in named_tables(document.camera, "camera")
     }
     targets = {
         name: MountedTarget(Target.from_dict(rest), body)
-        for name, body, rest in _named(document.target, "target")
+        for name, body, rest in named_tables(document.target, "target")
     }
     return RigRecording(document.name, cameras, targets, (), None, document.source)
 

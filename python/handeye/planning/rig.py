@@ -6,7 +6,7 @@ the pairs, the error is then eliminated, ``I = H_tt - H_tu (H_uu + 1)^-1 H_ut``.
 candidates, those are looked at whose gains, each camera for itself, sum up to the most.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,71 +15,19 @@ from handeye import _core
 from handeye.codes import Code
 from handeye.errors import DegenerateError, InputError
 from handeye.estimation import Estimate, RigEstimate
-from handeye.estimation.confidence import Within
+from handeye.estimation.touch import touch_rows
+from handeye.estimation.work import Work, lay_out
 from handeye.planning.candidates import Pool
 from handeye.planning.constraints import ViewLimits, corners_at, out_of_limits
 from handeye.planning.prediction import Prediction, Sight
+from handeye.planning.rig_request import Aim, Pair, seen_most
 from handeye.planning.visibility import obstacles
 from handeye.types.arrays import FloatArray
 from handeye.types.mounting import Mounting
 from handeye.types.rig import Body
 
-Pair = tuple[str, str]
 # Candidates whose joint information is computed.
 SHORTLIST = 24
-FEWEST_STATIONS = 6
-
-
-@dataclass(frozen=True)
-class RigRequest:
-    """How accurate all cameras must be: radii that hold their errors with 95 % probability.
-
-    Parameters
-    ----------
-    translation_mm, rotation_deg
-        Of the pose of each camera.
-    cameras
-        Those that are asked for; None for all.
-    camera_to_camera
-        The same two radii for cameras of one body in each other; None if that is not asked for.
-
-    Raises
-    ------
-    InputError
-        A radius that is not above zero.
-    """
-
-    translation_mm: float = 0.5
-    rotation_deg: float = 0.05
-    cameras: tuple[str, ...] | None = None
-    camera_to_camera: tuple[float, float] | None = None
-
-    def __post_init__(self) -> None:
-        if min(self.translation_mm, self.rotation_deg, *(self.camera_to_camera or ())) <= 0:
-            raise InputError("an accuracy above zero is needed", code=Code.OUT_OF_RANGE)
-
-    def missing(self, estimate: RigEstimate) -> dict[tuple[str, ...], float]:
-        """Return what does not meet the request, and by which factor; cameras, or two in each other."""
-        found: dict[tuple[str, ...], float] = {}
-        for name in estimate.fit.measurements.cameras:
-            if self.cameras is None or name in self.cameras:
-                now = estimate.of_camera(name).within_95
-                found[(name,)] = _factor(now, self.translation_mm, self.rotation_deg)
-        if self.camera_to_camera is not None:
-            for a, b in rigid_pairs(estimate):
-                found[a, b] = _factor(estimate.camera_to_camera(a, b).within_95, *self.camera_to_camera)
-        return {names: factor for names, factor in found.items() if factor > 1}
-
-
-def rigid_pairs(estimate: RigEstimate) -> list[Pair]:
-    """Return the pairs of cameras on one body."""
-    cameras = estimate.fit.measurements.cameras
-    names = list(cameras)
-    return [(a, b) for i, a in enumerate(names) for b in names[i + 1 :] if cameras[a].body is cameras[b].body]
-
-
-def _factor(now: Within, translation_mm: float, rotation_deg: float) -> float:
-    return max(now.translation_mm / translation_mm, now.rotation_deg / rotation_deg)
 
 
 def mounted_on_flange(estimate: RigEstimate) -> FloatArray:
@@ -123,7 +71,7 @@ class RigGains:
 def rig_gains(
     estimate: RigEstimate,
     pool: Pool,
-    wanted: Mapping[tuple[str, ...], float],
+    wanted: Collection[Aim],
     sight: Sight | None = None,
     limits: ViewLimits | None = None,
 ) -> RigGains:
@@ -136,7 +84,7 @@ def rig_gains(
     pool
         Candidates.
     wanted
-        Cameras, or two in each other, by their names.
+        What is asked for and not reached.
     sight
         What a camera must see of a target.
     limits
@@ -146,15 +94,17 @@ def rig_gains(
     ------
     DegenerateError
         The information of the stations is singular.
+    InputError
+        Nothing in a box of work that is asked for can be seen and touched.
     """
     sight = sight or Sight(margin_px=20.0)
-    targets = list(wanted) or [(name,) for name in estimate.fit.measurements.cameras]
+    aims = list(wanted) or [Aim((name,)) for name in estimate.fit.measurements.cameras]
     pairs = {
         (camera, target): estimate.of_pair(camera, target)
         for camera, target in estimate.fit.measurements.pairs
         if estimate.fit.measurements.moves(camera, target)
     }
-    needed = {name for names in targets for name in names}
+    needed = {name for aim in aims for name in aim.cameras}
     sums = np.zeros(len(pool))
     visible: dict[Pair, np.ndarray] = {}
     criterion = _core.Criterion("entropy_handeye")
@@ -183,9 +133,9 @@ def rig_gains(
         clear = Prediction(one, sight).in_sight(there) & np.array([why is None for why in hidden])
         visible[pair] = visible[pair][order] & clear
     informations = _joint(estimate, pairs, short, visible, sight)
-    combinations = np.array([_combination(estimate, names) for names in targets])
     before = np.asarray(estimate.fit.posterior.information)
-    sizes = _log_sizes(np.concatenate([before[None], before + informations]), combinations)
+    combinations = [_combination(estimate, aim) for aim in aims]
+    sizes = _log_sizes(np.concatenate([before[None], before + informations]), aims, combinations)
     value = np.sum(sizes[0] - sizes[1:], axis=1)
     usable = np.any([visible[pair] for pair in pairs], axis=0)
     for place, i in enumerate(order):
@@ -211,29 +161,69 @@ def _without_arm(one: Estimate) -> Estimate:
     )
 
 
-def _combination(estimate: RigEstimate, names: tuple[str, ...]) -> FloatArray:
-    """(6, n) the twist that is asked for, as a combination of the parameters."""
+def _combination(estimate: RigEstimate, aim: Aim) -> FloatArray:
+    """(m, n) what is asked for, as a combination of the parameters: of a twist, or of touches."""
     fit = estimate.fit
+    if aim.touch is not None:
+        return _touches(estimate, aim.cameras[0], aim.touch)
     combination = np.zeros((6, len(fit.theta)))
-    combination[:, fit.rows_of_x(names[0])] = np.eye(6)
-    if len(names) > 1:
-        combination[:, fit.rows_of_x(names[1])] = -(fit.X[names[0]] @ fit.X[names[1]].inverse()).adjoint()
+    combination[:, fit.rows_of_x(aim.cameras[0])] = np.eye(6)
+    if len(aim.cameras) > 1:
+        a, b = aim.cameras
+        combination[:, fit.rows_of_x(b)] = -(fit.X[a] @ fit.X[b].inverse()).adjoint()
     return combination
 
 
-def _log_sizes(informations: FloatArray, combinations: FloatArray) -> FloatArray:
-    """(N, C) logarithms of the determinants of the covariances of combinations (C, 6, n)."""
+def _touches(estimate: RigEstimate, camera: str, work: Work) -> FloatArray:
+    """(m, n) rows whose squares sum up, over a covariance, to three times the mean square of touch errors."""
+    pair = seen_most(estimate, camera)
+    one = estimate.of_pair(*pair)
+    laid = lay_out(one, estimate.fit.measurements.pairs[pair], work)
+    rows = touch_rows(one, laid.touches)[0].reshape(3 * len(laid.touches), -1)
+    combination = np.zeros((rows.shape[1], len(estimate.fit.theta)))
+    # As many rows as parameters say the same as those of all touches.
+    combination[:, _rows(estimate, pair)] = np.linalg.qr(
+        np.concatenate([rows, np.zeros((rows.shape[1], rows.shape[1]))]), mode="r"
+    ) / np.sqrt(len(laid.touches))
+    return combination
+
+
+def _rows(estimate: RigEstimate, pair: Pair) -> list[int]:
+    """Return where the parameters of a pair's estimate stand among those of all."""
+    fit, (camera, target) = estimate.fit, pair
+    return [
+        *fit.rows_of_x(camera),
+        *fit.rows_of_y(target),
+        *fit.rows_of_camera(camera),
+        fit.row_of_board(target),
+        *fit.rows_of_arm,
+    ]
+
+
+def _log_sizes(
+    informations: FloatArray, aims: Sequence[Aim], combinations: Sequence[FloatArray]
+) -> FloatArray:
+    """(N, C) sizes of what is asked for, C combinations (m, n): logarithms of determinants of covariances."""
     scale = 1 / np.sqrt(np.diag(informations[0]))
-    rows = combinations * scale
+    rows = np.concatenate(combinations) * scale
     try:
-        solved = np.linalg.solve(informations * scale[:, None] * scale, rows.reshape(-1, len(scale)).T)
+        solved = np.linalg.solve(informations * scale[:, None] * scale, rows.T)
     except np.linalg.LinAlgError as error:
         raise DegenerateError("the information of the stations is singular") from error
-    blocks = rows @ np.swapaxes(solved.reshape(len(informations), len(scale), -1, 6), 1, 2)
-    signs, logarithms = np.linalg.slogdet(blocks)
-    if not np.all(signs > 0):
-        raise DegenerateError("the information of the stations is singular")
-    return logarithms
+    sizes: list[FloatArray] = []
+    ends = np.cumsum([len(one) for one in combinations])
+    for aim, one, end in zip(aims, combinations, ends, strict=True):
+        part = slice(end - len(one), end)
+        covariances = rows[part] @ solved[:, :, part]
+        if aim.touch is None:
+            signs, size = np.linalg.slogdet(covariances)
+        else:
+            mean_squares = np.trace(covariances, axis1=1, axis2=2)
+            signs, size = np.sign(mean_squares), 3 * np.log(np.abs(mean_squares))
+        if not np.all(signs > 0):
+            raise DegenerateError("the information of the stations is singular")
+        sizes.append(size)
+    return np.stack(sizes, axis=1)
 
 
 def _joint(
@@ -244,8 +234,7 @@ def _joint(
     sight: Sight,
 ) -> FloatArray:
     """(N, n, n) information of candidates with all that is seen there, the robot's error shared."""
-    fit = estimate.fit
-    count = len(fit.theta)
+    count = len(estimate.fit.theta)
     total: FloatArray | None = None
     for (camera, target), one in pairs.items():
         motions = pool.motions(one.mounting)
@@ -268,14 +257,7 @@ def _joint(
         )
         nothing = np.zeros((len(motions), 6, 1))
         own = predictor.informations(motions, arm=(nothing, columns))
-        rows = [
-            *fit.rows_of_x(camera),
-            *fit.rows_of_y(target),
-            *fit.rows_of_camera(camera),
-            fit.row_of_board(target),
-            *fit.rows_of_arm,
-            *range(count, count + shared),
-        ]
+        rows = [*_rows(estimate, (camera, target)), *range(count, count + shared)]
         if total is None:
             total = np.zeros((len(motions), count + shared, count + shared))
         total[:, np.array(rows)[:, None], rows] += own * visible[camera, target][:, None, None]

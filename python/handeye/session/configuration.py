@@ -15,10 +15,10 @@ from handeye.errors import DeviceError, InputError
 from handeye.importing import SourceOptions, open_folder
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm, open_arm, shipped_arms
-from handeye.robots.protocol import Goal
+from handeye.robots.protocol import Goal, Robot
 from handeye.robots.replay import ReplayRobot
 from handeye.robots.shapes import read_shapes
-from handeye.session.attempt import Cell
+from handeye.session.attempt import Cell, Eye
 from handeye.session.calls import Calls
 from handeye.session.closing import close, close_all
 from handeye.session.drivers import REPLAY, Person, open_camera, open_robot, replayed_camera
@@ -40,6 +40,7 @@ from handeye.session.simulated import SimulationOptions, simulated_cell
 from handeye.session.starting import Start
 from handeye.session.store import SessionStore, create_session, open_session
 from handeye.types import Camera, Mounting, Recording, Target
+from handeye.types.rig import CAMERA, TARGET
 
 
 def prepare(
@@ -77,6 +78,46 @@ def prepare(
     observer = observer or Observer()
     if configuration.is_replay:
         return _replayed(configuration, camera, confirm, observer)
+    arm, solids, configuration = described(configuration)
+    if configuration.is_simulated:
+        return _simulated(configuration, arm, target, confirm, solids, observer)
+    if target is None:
+        raise InputError(
+            "a real cell needs a target", code=Code.MISSING_VALUE, hint="name its file with --target"
+        )
+    configuration.workspace()  # must be stated
+    person = person or Person(nobody, lambda _: None)
+    robot_calls, camera_calls = Calls("robot"), Calls("camera")
+    with ExitStack() as failed:
+        robot = open_robot(
+            configuration.driver, person, arm, joints_told=None if start is None else start.posture_known
+        )
+        failed.callback(close, robot_calls, robot)
+        source = open_camera(configuration.images, robot, person, configuration.timeouts.grab_s)
+        failed.callback(close, camera_calls, source)
+        if camera is None:
+            size_px = _pictured_size(source, camera_calls, configuration.timeouts.grab_s)
+            camera = nominal_camera(size_px, configuration.lens)
+            configuration = replace(configuration, camera_known=False)
+        cell = real_cell(
+            configuration, arm, solids, robot, Eye((CAMERA, TARGET), source, camera, target), confirm
+        )
+        cell = replace(cell, observer=observer, robot_calls=robot_calls, camera_calls=camera_calls)
+        if start is None:
+            start = standing(cell, arm)
+        failed.pop_all()
+    recording = Recording(f"session with {arm.name}", configuration.mounting, camera, target, ())
+    return Prepared(configuration, cell, start, recording)
+
+
+def described(configuration: Configuration) -> tuple[Arm, SolidLinks | None, Configuration]:
+    """Return the arm, the shapes of its links where they are known, and what is then judged by.
+
+    Raises
+    ------
+    InputError
+        No arm is named, or its description cannot be read.
+    """
     if configuration.robot is None:
         raise InputError(
             "no arm is named",
@@ -85,48 +126,38 @@ def prepare(
         )
     arm = open_arm(configuration.robot)
     solids = _solids(configuration, arm)
-    configuration = replace(
-        configuration, collisions=Collisions.CAPSULES if solids is None else Collisions.MESHES
+    by = Collisions.CAPSULES if solids is None else Collisions.MESHES
+    return arm, solids, replace(configuration, collisions=by)
+
+
+def real_cell(
+    configuration: Configuration,
+    arm: Arm,
+    solids: SolidLinks | None,
+    robot: Robot,
+    eye: Eye,
+    confirm: Callable[[Goal], bool] | None,
+) -> Cell:
+    """Return the cell of drivers that are open, with one camera and target.
+
+    Raises
+    ------
+    InputError
+        No workspace is stated.
+    """
+    return Cell(
+        robot,
+        eye.source,
+        arm,
+        configuration.workspace(),
+        eye.camera,
+        eye.target,
+        configuration.timeouts,
+        confirm,
+        solids,
+        configuration.speed_rad_s,
+        by_hand=configuration.by_hand,
     )
-    if configuration.is_simulated:
-        return _simulated(configuration, arm, target, confirm, solids, observer)
-    if target is None:
-        raise InputError(
-            "a real cell needs a target", code=Code.MISSING_VALUE, hint="name its file with --target"
-        )
-    workspace = configuration.workspace()
-    person = person or Person(_nobody, lambda _: None)
-    robot_calls, camera_calls = Calls("robot"), Calls("camera")
-    with ExitStack() as failed:
-        robot = open_robot(configuration.driver, person, arm, joints_told=_told(start))
-        failed.callback(close, robot_calls, robot)
-        source = open_camera(configuration.images, robot, person, configuration.timeouts.grab_s)
-        failed.callback(close, camera_calls, source)
-        if camera is None:
-            size_px = _pictured_size(source, camera_calls, configuration.timeouts.grab_s)
-            camera = nominal_camera(size_px, configuration.lens)
-            configuration = replace(configuration, camera_known=False)
-        cell = Cell(
-            robot,
-            source,
-            arm,
-            workspace,
-            camera,
-            target,
-            configuration.timeouts,
-            confirm,
-            solids,
-            configuration.speed_rad_s,
-            by_hand=configuration.by_hand,
-            observer=observer,
-            robot_calls=robot_calls,
-            camera_calls=camera_calls,
-        )
-        if start is None:
-            start = _standing(cell, arm)
-        failed.pop_all()
-    recording = Recording(f"session with {arm.name}", configuration.mounting, camera, target, ())
-    return Prepared(configuration, cell, start, recording)
 
 
 def begin(prepared: Prepared, folder: Any) -> tuple[Session, SessionStore]:  # noqa: ANN401
@@ -201,11 +232,7 @@ def left_at(entries: Sequence[Entry]) -> tuple[float, ...] | None:
     return None
 
 
-def _told(start: Start | None) -> bool | None:
-    return None if start is None else start.posture_known
-
-
-def _standing(cell: Cell, arm: Arm) -> Start:
+def standing(cell: Cell, arm: Arm) -> Start:
     """Return where the arm stands, if that is a place from which it may go.
 
     Raises
@@ -371,5 +398,12 @@ def _pictured_size(source: ImageSource, calls: Calls, patience_s: float) -> tupl
     return width, height
 
 
-def _nobody(question: str) -> str:
+def nobody(question: str) -> str:
+    """Answer nothing: there is no person.
+
+    Raises
+    ------
+    EOFError
+        Always.
+    """
     raise EOFError(question)

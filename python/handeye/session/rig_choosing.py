@@ -14,7 +14,8 @@ from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.collisions import Body, Workspace
 from handeye.planning.constraints import ViewLimits
 from handeye.planning.prediction import Sight
-from handeye.planning.rig import FEWEST_STATIONS, RigRequest, rig_gains
+from handeye.planning.rig import rig_gains
+from handeye.planning.rig_request import FEWEST_STATIONS, RigRequest, rig_touch_map
 from handeye.planning.solids import SolidLinks
 from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
@@ -24,6 +25,7 @@ from handeye.session.starting import LARGEST_TILT_RAD, Start, largest_tilt_rad, 
 from handeye.session.wish import Wish
 from handeye.types import Pose, RigRecording, Station
 from handeye.types.arrays import FloatArray
+from handeye.types.units import MM_PER_M
 
 # The phase of a step back.
 BACK = "back"
@@ -101,9 +103,8 @@ class RigChooser:
         """Return the next step, or why there is none."""
         count, believed = len(situation.stations), situation.believed
         if believed is not None and self._met(believed, count):
-            mm, deg = _worst(believed)
-            reached = f"every camera within {mm:.2g} mm and {deg:.2g} deg"
-            return Halt(EndReason.ACCURACY_REACHED, f"with 95 % probability {reached}, as asked")
+            reached = f"with 95 % probability {_reached(believed, self._wish)}, as asked"
+            return Halt(EndReason.ACCURACY_REACHED, reached)
         if count >= self._wish.most_views:
             return Halt(EndReason.VIEWS_TAKEN, f"{count} stations taken, as asked")
         halt = situation.too_many(self._wish.failures_in_a_row)
@@ -190,7 +191,7 @@ class RigChooser:
         decision = {
             "predicted_gain": float(found.gains[best]),
             "expected": [{"camera": camera, "target": target} for camera, target in found.seen[best]],
-            "missing": {" ".join(names): factor for names, factor in missing.items()},
+            "missing": {str(aim): factor for aim, factor in missing.items()},
             "reach_before": {
                 name: believed.of_camera(name).within_95.to_dict()
                 for name in believed.fit.measurements.cameras
@@ -262,13 +263,20 @@ def _turns(seen: Sequence[set[tuple[str, str]]]) -> tuple[int, int]:
 
 
 def request_of(wish: Wish) -> RigRequest | None:
-    """Return the accuracy that is asked for of all cameras; None to take all stations."""
+    """Return what is asked for of all cameras; None to take all stations."""
+    if wish.touch_mm is not None:
+        return RigRequest(camera_to_camera=wish.camera_to_camera, touch_mm=wish.touch_mm, work=wish.work)
     if wish.accuracy_mm is None or wish.accuracy_deg is None:
         return None
     return RigRequest(wish.accuracy_mm, wish.accuracy_deg, camera_to_camera=wish.camera_to_camera)
 
 
-def _worst(believed: RigEstimate) -> tuple[float, float]:
-    """Return the largest radii of all cameras, millimetres and degrees."""
-    radii = [believed.of_camera(name).within_95 for name in believed.fit.measurements.cameras]
-    return max(r.translation_mm for r in radii), max(r.rotation_deg for r in radii)
+def _reached(believed: RigEstimate, wish: Wish) -> str:
+    """Return the largest radii of all cameras, in words."""
+    names = believed.fit.measurements.cameras
+    if wish.touch_mm is not None:
+        worst = max(rig_touch_map(believed, name, wish.work).worst_m for name in names) * MM_PER_M
+        return f"a touch by what any camera sees within {worst:.2g} mm"
+    radii = [believed.of_camera(name).within_95 for name in names]
+    mm, deg = max(r.translation_mm for r in radii), max(r.rotation_deg for r in radii)
+    return f"every camera within {mm:.2g} mm and {deg:.2g} deg"

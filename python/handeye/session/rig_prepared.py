@@ -1,6 +1,7 @@
 """A run with several cameras that is ready to begin, and one that goes on."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,9 @@ from handeye.errors import InputError
 from handeye.robots import ArmKinematics, open_arm
 from handeye.robots.simulated import SimulatedArm
 from handeye.session.attempt import Cell
+from handeye.session.closing import close_all
 from handeye.session.configuration import left_at
+from handeye.session.entry import stations_of
 from handeye.session.journal import read_settings
 from handeye.session.rig import RigSession
 from handeye.session.rig_choosing import RigChooser
@@ -91,7 +94,7 @@ def begin_rig(prepared: RigPrepared, folder: Path) -> tuple[RigSession, RigStore
 
 
 def go_on_rig(
-    folder: Path, prepare: Callable[[Configuration], RigPrepared]
+    folder: Path, prepare: Callable[[Configuration, RigRecording, Start | None], RigPrepared]
 ) -> tuple[RigSession, RigStore, RigPrepared]:
     """Open a session that was broken off, or has ended, with the same settings.
 
@@ -100,7 +103,8 @@ def go_on_rig(
     folder
         Of the session.
     prepare
-        Makes the cell again that the settings ask for.
+        Makes the cell again that the settings ask for, with the recording that the session began with, and
+        where the arm stood then; None before the first station.
 
     Raises
     ------
@@ -110,16 +114,19 @@ def go_on_rig(
         A driver fails.
     """
     store = open_rig_session(folder)
-    try:
-        prepared = prepare(Configuration.from_dict(store.settings.get("configuration")))
+    with ExitStack() as failed:
+        failed.callback(store.close)
+        configuration = Configuration.from_dict(store.settings.get("configuration"))
+        begun = bool(stations_of(store.entries)) or configuration.is_simulated
+        # Before the first station the arm may be driven elsewhere, and begins from there.
+        start = read_start(store.settings) if begun else None
+        prepared = prepare(configuration, store.begun_with, start)
+        failed.callback(close_all, prepared.cell)
         check_fingerprints(store.settings, fingerprints(prepared.cell.arm, None))
-        if prepared.hidden_arm is not None:
-            start = read_start(store.settings)
+        if prepared.hidden_arm is not None and start is not None:
             prepared.hidden_arm.place(left_at(store.entries) or start.joints_rad)
         session = prepared.session(store)
-    except BaseException:
-        store.close()
-        raise
+        failed.pop_all()
     return session, store, prepared
 
 

@@ -67,11 +67,14 @@ class RigSettings:
         Radii (mm, deg) for cameras of one body in each other; None if they are not asked for.
     candidates
         Postures drawn at every step.
+    images
+        Where the pictures of each camera come from, by its name; None for a simulated rig.
     """
 
     cameras: tuple[str, ...] | None = None
     camera_to_camera: tuple[float, float] | None = None
     candidates: int = 600
+    images: dict[str, str] | None = None
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from handeye.compute.parallel import Progress, Workers, run_all
 from handeye.estimation import RigEstimate
-from handeye.planning.rig import RigRequest, rigid_pairs
+from handeye.planning.rig_request import RigRequest, rigid_pairs
 from handeye.session.deciding import EndReason
 from handeye.session.rig import RigEnd
 from handeye.session.rig_choosing import request_of

@@ -1,0 +1,152 @@
+"""The cameras and targets of a rig that is to be driven, in one TOML file.
+
+::
+
+    [[camera]]
+    name = "left"
+    on = "flange"                   or "base"
+    images = "basler:40012345"      its driver, as for `handeye run --images`
+    calibration = "left.yaml"       any file of a camera; or its fields, as in a recording
+
+    [[target]]
+    name = "table"
+    on = "base"                     or "flange"
+    board = "table.toml"            any file of a target; or its fields, as in a recording
+
+Files are named from where this one lies.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+from handeye.codes import Code
+from handeye.datasets.camera_files import read_camera
+from handeye.datasets.parameter_files import read_target
+from handeye.datasets.reading import located, read_text
+from handeye.datasets.recording_header import MAX_BYTES
+from handeye.datasets.rig_format import named_tables
+from handeye.datasets.toml_reading import parse_toml
+from handeye.errors import InputError
+from handeye.types import Camera, MountedCamera, MountedTarget, RigRecording, Target
+from handeye.types.plain import Document, read_document
+from handeye.types.target.coded import Coded
+
+
+class _Description(Document):
+    camera: list[dict[str, Any]]
+    target: list[dict[str, Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class RigDescription:
+    """A rig as it is described.
+
+    Parameters
+    ----------
+    recording
+        Its cameras and targets, without a station.
+    images
+        The driver of each camera, by the name of the camera.
+
+    Examples
+    --------
+    >>> rig = read_rig_description("rig.toml")   # doctest: +SKIP
+    >>> rig.images["left"]                       # doctest: +SKIP
+    'basler:40012345'
+    """
+
+    recording: RigRecording
+    images: Mapping[str, str]
+
+
+def read_rig_description(path: str | os.PathLike[str]) -> RigDescription:
+    """Read what there is of cameras and targets.
+
+    Parameters
+    ----------
+    path
+        A TOML file, see the head of this module.
+
+    Raises
+    ------
+    InputError
+        A missing or unusable field or file, or two targets that a picture does not tell apart.
+
+    Examples
+    --------
+    >>> sorted(read_rig_description("rig.toml").recording.cameras)   # doctest: +SKIP
+    ['left', 'right']
+    """
+    file = Path(path)
+    document = read_document(parse_toml(read_text(file, MAX_BYTES), file), _Description, str(file))
+    cameras: dict[str, MountedCamera] = {}
+    targets: dict[str, MountedTarget] = {}
+    images: dict[str, str] = {}
+    with located(str(file)):
+        for name, body, rest in named_tables(document.camera, "camera"):
+            images[name] = _text(rest.pop("images", None), f"camera {name}: images", "the name of its driver")
+            calibration = rest.pop("calibration", None)
+            if calibration is None:
+                with located(f"camera {name}"):
+                    camera = Camera.from_dict(rest)
+            else:
+                camera = read_camera(_beside(file, calibration, rest, f"camera {name}: calibration"))
+            cameras[name] = MountedCamera(camera, body)
+        for name, body, rest in named_tables(document.target, "target"):
+            board = rest.pop("board", None)
+            if board is None:
+                with located(f"target {name}"):
+                    target = Target.from_dict(rest)
+            else:
+                target = read_target(_beside(file, board, rest, f"target {name}: board"))
+            targets[name] = MountedTarget(target, body)
+        for (a, one), (b, other) in combinations(targets.items(), 2):
+            if look_alike(one.target, other.target):
+                raise InputError(
+                    f"targets {a} and {b}: a picture does not tell which of them it shows",
+                    code=Code.INVALID_FIELD,
+                    hint="use boards of other ids or of other numbers of squares: handeye target prints them",
+                )
+        recording = RigRecording(file.stem, cameras, targets, ())
+    return RigDescription(recording, images)
+
+
+def look_alike(one: Target, other: Target) -> bool:
+    """Tell whether a picture of one target may be taken for one of the other.
+
+    Examples
+    --------
+    >>> from handeye.types import Chessboard
+    >>> look_alike(Chessboard(6, 9, 0.025), Chessboard(6, 9, 0.04))
+    True
+    """
+    if isinstance(one, Coded) and isinstance(other, Coded):
+        shared = set(one.marker_ids.tolist()) & set(other.marker_ids.tolist())
+        return one.dictionary == other.dictionary and bool(shared)
+    return _counts(one) == _counts(other)
+
+
+def _counts(target: Target) -> dict[str, Any]:
+    """Return what a picture shows of a target: all but its sizes."""
+    return {name: value for name, value in target.to_dict().items() if not name.endswith("_m")}
+
+
+def _text(value: object, what: str, expected: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise InputError(f"{what}: found {str(value)[:60]!r}, expected {expected}", code=Code.INVALID_FIELD)
+    return value
+
+
+def _beside(file: Path, value: object, rest: Mapping[str, Any], what: str) -> Path:
+    """Return the file that a field names; nothing else may be said then."""
+    name = _text(value, what, "the name of a file")
+    if rest:
+        raise InputError(
+            f"{what}: a file, and {', '.join(map(str, rest))[:100]} beside it; expected one or the other",
+            code=Code.INVALID_FIELD,
+        )
+    return file.parent / name
