@@ -5,11 +5,13 @@ import pytest
 
 from handeye.errors import DegenerateError, InputError
 from handeye.estimation import RigEstimate, RigMeasurements, estimate_rig
+from handeye.estimation.touch import touch_error
+from handeye.estimation.work import Work, lay_out
 from handeye.planning import rig
 from handeye.planning.candidates import Candidate, Pool
 from handeye.planning.prediction import Sight
 from handeye.planning.rig import rig_gains
-from handeye.planning.rig_request import Aim, RigRequest
+from handeye.planning.rig_request import Aim, RigRequest, rig_touch_map, seen_most
 from handeye.robots import ArmKinematics, open_arm
 from handeye.simulation.cells import ErrorKind
 from handeye.simulation.rigs import RigOptions, simulate_rig
@@ -92,6 +94,38 @@ def test_a_request_names_what_it_lacks(recording: RigRecording) -> None:
     assert all(factor > 1 for factor in tight.values())
     with pytest.raises(InputError):
         RigRequest(0.0, 1.0)
+
+
+@pytest.mark.parametrize("camera", ["left", "front"])
+def test_what_is_touched_is_weighed_by_its_mean_square_error(recording: RigRecording, camera: str) -> None:
+    estimate, work = estimated(recording, 10), Work()
+    pair = seen_most(estimate, camera)
+    one = estimate.of_pair(*pair)
+    laid = lay_out(one, estimate.fit.measurements.pairs[pair], work).touches
+    error = touch_error(one, laid)
+    wanted = float(np.trace(error.covariances - error.noise, axis1=1, axis2=2).mean())
+    rows = rig._combination(estimate, Aim((camera,), work))
+    assert float(np.trace(rows @ estimate.covariance @ rows.T)) == pytest.approx(wanted, rel=1e-6)
+    worst_m = rig_touch_map(estimate, camera, work).worst_m
+    assert worst_m == pytest.approx(error.radii_m.max())
+    asked = RigRequest(cameras=(camera,), touch_mm=0.5e3 * worst_m, work=work)
+    assert list(asked.missing(estimate).values()) == pytest.approx([2.0])
+    assert not RigRequest(cameras=(camera,), touch_mm=1.1e3 * worst_m, work=work).missing(estimate)
+
+
+def test_planning_for_touches_makes_them_smaller(recording: RigRecording) -> None:
+    before = estimated(recording, 8)
+    pool = Pool.of_views(station.views[0].view for station in recording.stations[8:])
+    names, work = list(before.fit.measurements.cameras), Work()
+    found = rig_gains(before, pool, [Aim((name,), work) for name in names], Sight())
+    best, worst = int(np.nanargmax(found.gains)), int(np.nanargmin(found.gains))
+    left: list[float] = []
+    for i in (best, worst):
+        stations = (*recording.stations[:8], recording.stations[8 + i])
+        after = estimate_rig(RigMeasurements.of(recording.with_stations(stations)), KNOWN)
+        maps = [rig_touch_map(after, name, work).mean_m for name in names]
+        left.append(float(np.sum(np.log(maps))))
+    assert left[0] < left[1]
 
 
 def test_an_empty_sight_gains_nothing(recording: RigRecording) -> None:

@@ -1,5 +1,6 @@
 """The closed loop on simulated cells: it reaches what was asked for, and faults end in words, not in numbers."""
 
+import json
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -237,6 +238,13 @@ def test_settings_of_sessions_of_earlier_versions_are_read() -> None:
     known = replace(configured(3), timeouts=Timeouts(move_s=7.0)).to_dict()
     known["patience"] = known.pop("timeouts")
     assert Configuration.from_dict(known).timeouts.move_s == 7.0
+
+
+def test_numbers_of_numpy_are_settings_too() -> None:
+    low, high = (tuple(row) for row in np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.5]]))
+    asked = Configuration("ur5e", accuracy_mm=np.float64(0.25), workspace_m=(low, high))
+    again = Configuration.from_dict(json.loads(json.dumps(asked.to_dict())))
+    assert (again.accuracy_mm, again.workspace_m) == (0.25, (low, high))
 
 
 class Stuck:

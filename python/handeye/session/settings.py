@@ -192,7 +192,7 @@ class Configuration:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; `from_dict` reads them back."""
-        return msgspec.to_builtins(self)
+        return msgspec.to_builtins(self, enc_hook=_number)
 
     @classmethod
     def from_dict(cls, data: object) -> "Configuration":
@@ -210,6 +210,13 @@ class Configuration:
             document["timeouts"] = document.pop("patience")
             return read_document(document, cls, "settings")
         return read_document(data, cls, "settings")
+
+
+def _number(value: object) -> object:
+    """Return a number of numpy as one of Python."""
+    if isinstance(value, np.generic):
+        return cast("float | int", value.item())
+    raise NotImplementedError(type(value).__name__)
 
 
 def settings_of(configuration: Configuration, start: Start | None) -> dict[str, Any]:
