@@ -112,6 +112,10 @@ const FLAT: f64 = 1e-3;
 /// Longest step of a level, in its logarithm.
 const LONGEST_STEP: f64 = 1.5;
 
+/// An arm that stood farther off than this (metres, radians) bends what cameras see of each other: what a linearisation
+/// leaves out of a metre is about the square of it, 10 micrometres.
+const BENDS: f64 = 3e-3;
+
 /// Estimates a cell from a guess of its poses.
 ///
 /// # Errors
@@ -124,8 +128,10 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
     let (mut steps, mut rounds, mut converged) = (0, 0, false);
     let at = |guess: &Guess| assemble(cell, guess, &components, &options.weak).reduced().ok_or_else(singular);
     let mut mixed = at(&guess)?;
-    if mixed.settled.rows > 0 {
-        guess.away = mixed.flange_twists(None);
+    let away = if mixed.settled.rows > 0 { mixed.flange_twists(None) } else { vec![] };
+    let bent = away.iter().any(|twist| twist.amax() > BENDS);
+    if bent {
+        guess.away = away;
         mixed = at(&guess)?;
     }
     let mut mode = None;
@@ -133,7 +139,7 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
         rounds += 1;
         let found = match levels {
             Some(levels) => find_mode(&mixed, levels, &[])?,
-            None => first_mode(&mixed, &options.levels, cell.is_unseen())?,
+            None => first_mode(&mixed, options, cell.is_unseen(), bent)?,
         };
         steps += found.steps;
         let answer = answer_at(&mixed, &found.t)?;
@@ -204,25 +210,22 @@ pub(super) struct Mode {
 
 /// The mode of the levels before any is known.
 ///
-/// Where measurements of a station see each other free of the arm, an arm that is far off bends them as long as the poses
-/// are: until these are better, lenses and boards are taken as they are said to be.
+/// Where measurements of a station see each other free of the arm, an arm that is far off bends them (`bent`) as long as the
+/// poses are: until these are better, lenses and boards are taken as they are said to be.
 ///
 /// Without pictures an error of the arm passes for one of the detector, and the likelihood can have a mode for either:
 /// the search begins small and large, and the better end counts.
-fn first_mode(mixed: &Mixed, levels: &[(String, f64)], unseen: bool) -> Result<Mode, Error> {
+fn first_mode(mixed: &Mixed, options: &Options, unseen: bool, bent: bool) -> Result<Mode, Error> {
     let mut start = mixed.start();
-    let mut left: Vec<_> = levels.iter().collect();
+    let mut left: Vec<_> = options.levels.iter().collect();
     for (t, level) in start.iter_mut().zip(&mixed.levels) {
         if let Some(i) = left.iter().position(|(name, _)| name == level.name) {
             *t = left.remove(i).1.ln();
         }
     }
     let of_pictures = mixed.components.iter().filter(|(name, _)| !components::is_of_robot(name));
-    let held: Vec<usize> = if mixed.settled.rows > 0 {
-        of_pictures.flat_map(|(_, range)| range.clone()).collect()
-    } else {
-        vec![]
-    };
+    let held: Vec<usize> =
+        if bent { of_pictures.flat_map(|(_, range)| range.clone()).collect() } else { vec![] };
     let small = find_mode(mixed, start, &held)?;
     if !unseen {
         return Ok(small);
