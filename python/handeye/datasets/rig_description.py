@@ -54,8 +54,8 @@ class RigDescription:
 
     Examples
     --------
-    >>> rig = read_rig_description("rig.toml")   # doctest: +SKIP
-    >>> rig.images["left"]                       # doctest: +SKIP
+    >>> described = RigDescription(rig.with_stations([]), {"left": "basler:40012345"})
+    >>> described.images["left"]
     'basler:40012345'
     """
 
@@ -78,8 +78,16 @@ def read_rig_description(path: str | os.PathLike[str]) -> RigDescription:
 
     Examples
     --------
-    >>> sorted(read_rig_description("rig.toml").recording.cameras)   # doctest: +SKIP
-    ['left', 'right']
+    >>> tables = {"camera": [], "target": []}
+    >>> for name, one in rig.cameras.items():
+    ...     table = {"name": name, "on": one.body.value, "images": "opencv:0"}
+    ...     tables["camera"].append(table | one.camera.to_dict())
+    >>> for name, one in rig.targets.items():
+    ...     tables["target"].append({"name": name, "on": one.body.value} | one.target.to_dict())
+    >>> from handeye.datasets.toml_text import toml_text
+    >>> _ = Path("rig.toml").write_text(toml_text(tables))
+    >>> sorted(read_rig_description("rig.toml").recording.cameras)
+    ['front', 'left', 'right', 'side']
     """
     file = Path(path)
     document = read_document(parse_toml(read_text(file, MAX_BYTES), file), _Description, str(file))
