@@ -173,6 +173,27 @@ def test_a_board_described_as_one_of_its_own_parts_is_not_found_under_wrong_name
         assert found.shown == GRID
 
 
+@pytest.mark.parametrize(("left", "top"), [(12, 20), (440, 380)])
+def test_two_markers_at_the_edge_of_a_picture_are_no_grid(left: int, top: int) -> None:
+    """They may be two single markers, or belong to a board that goes on outside."""
+    image = np.full((480, 640), 200, dtype=np.uint8)
+    markers = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
+    for k, number in enumerate((57, 83)):
+        printed = cv2.aruco.generateImageMarker(markers, number, 84)
+        image[top : top + 84, left + 110 * k : left + 110 * k + 84] = np.where(printed > 0, 220, 30)
+    missing = detect(image, ArucoMarker(0.1, "DICT_5X5_100", 3))
+    assert isinstance(missing, NotFound)
+    assert missing.shown in [ArucoMarker(0.1, "DICT_5X5_100", number) for number in (57, 83)]
+    missing = detect(image, GRID)
+    assert isinstance(missing, NotFound)
+    assert missing.shown is None
+    middle = np.roll(image, (200 - top, 220 - left), axis=(0, 1))
+    missing = detect(middle, GRID)
+    assert isinstance(missing, NotFound)
+    assert isinstance(missing.shown, ArucoGrid)
+    assert missing.shown.marker_ids.tolist() == [57, 83]
+
+
 @pytest.mark.parametrize("name", BOARDS)
 def test_any_board_is_recognised(name: str) -> None:
     board: Target = BOARDS[name]

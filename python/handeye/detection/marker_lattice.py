@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handeye.detection.base import NotFound, Reason
+from handeye.detection.base import NotFound, Reason, affine
 from handeye.detection.marker_reading import Reading
 from handeye.detection.markers import NO_IDS, Seen
 from handeye.detection.part import mapped
@@ -60,6 +60,12 @@ class MarkerLattice:
         """Rows and columns that are seen."""
         columns, rows = (self.places.max(axis=0) + 1).tolist()
         return rows, columns
+
+    def singles(self) -> "Iterator[MarkerLattice]":
+        """Yield each marker for itself."""
+        for k in range(len(self.ids)):
+            one = replace(self.reading, ids=self.ids[[k]], corners=self.reading.corners[[k]])
+            yield MarkerLattice(one, np.zeros((1, 2), dtype=np.int64), self.step)
 
 
 def lattices_of(reading: Reading, step: float | None = None) -> list[MarkerLattice]:
@@ -146,7 +152,15 @@ def _grown(first: int, steps: FloatArray, away: FloatArray) -> dict[int, IndexAr
 
 def boards_like(described: Target, lattice: MarkerLattice, image_size: tuple[int, int]) -> Iterator[Coded]:
     """Yield boards that have the markers of a lattice, those most like the one described first."""
-    for board in _proposed(described, lattice):
+    proposed = _proposed(described, lattice)
+    if len(lattice.ids) == 2 and not _would_show_more(lattice, image_size):
+        # At the picture's edge nothing tells whether two markers are a board, unless it is much as described.
+        if isinstance(described, ArucoMarker):
+            for single in lattice.singles():
+                yield from boards_like(described, single, image_size)
+            return
+        proposed = _changed(described, lattice.reading) if isinstance(described, Coded) else ()
+    for board in proposed:
         if board is not None and _has(board, lattice, image_size):
             yield board
 
@@ -172,6 +186,16 @@ def _has(board: Coded, lattice: MarkerLattice, image_size: tuple[int, int]) -> b
         return False
     # A line of which nothing is seen though it should be in the picture is not there.
     return bool(within.all()) or not _in_picture(places[~within], lattice, image_size).any()
+
+
+def _would_show_more(lattice: MarkerLattice, image_size: tuple[int, int]) -> bool:
+    """Tell whether all places around those of a lattice are in the picture, as its markers have them."""
+    corner = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / (2 * lattice.step)
+    flat = (lattice.places[:, np.newaxis] + corner).reshape(-1, 2)
+    low, high = -1 - ROOM, lattice.places.max(axis=0) + 1 + ROOM
+    A, b = affine(flat, lattice.reading.corners.reshape(-1, 2))
+    around = np.array([[low, low], [high[0], low], high, [low, high[1]]]) @ A + b
+    return bool(((around >= 0) & (around <= image_size)).all())
 
 
 def _in_picture(places: IndexArray, lattice: MarkerLattice, image_size: tuple[int, int]) -> NDArray[np.bool_]:
