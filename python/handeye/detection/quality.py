@@ -5,15 +5,17 @@ it is beside the others; how far all of them are off a flat board seen through a
 The fewer the points, the more what is usual counts.
 """
 
+import cv2
 import numpy as np
 
-from handeye import _core
 from handeye.detection.base import Detection
+from handeye.detection.part import mapped
 from handeye.types import Target
 from handeye.types.arrays import FloatArray
 
-# Numbers of a homography; a lens adds polynomials of a degree, from so many points for each of their terms.
-OF_HOMOGRAPHY, DEGREES, POINTS_PER_TERM = 8, (6, 5, 4, 3), 1.9
+# Numbers of a homography; a lens adds polynomials in the image of a degree, from so many points for each of
+# their terms: those of its distortion.
+OF_HOMOGRAPHY, DEGREES, POINTS_PER_TERM = 8, (5, 4, 3), 1.7
 # What is usual counts as one measurement.
 USUAL_COUNT = 1.0
 # No point is better.
@@ -30,19 +32,21 @@ def off_plane(plane: FloatArray, pixels: FloatArray) -> tuple[FloatArray, int] |
 
     Also how many of their coordinates such a view leaves free; None where there is no such view.
     """
-    lens = _core.PlaneMap.fitted(plane, pixels)
-    if lens is None:
+    # OpenCV gives None where it finds none, whatever its types say.
+    found, _ = cv2.findHomography(plane, pixels, 0)
+    if found is None:  # pyright: ignore[reportUnnecessaryComparison]
         return None
-    off = pixels - lens.pixels(plane)
+    off = pixels - mapped(np.asarray(found, dtype=np.float64), plane)
     for degree in DEGREES:
         powers = [(i, k) for i in range(degree + 1) for k in range(degree + 1 - i)]
         if len(plane) >= POINTS_PER_TERM * len(powers):
-            low, high = plane.min(axis=0), plane.max(axis=0)
-            x, y = ((2 * plane - low - high) / np.maximum(high - low, 1e-12)).T
+            low, high = pixels.min(axis=0), pixels.max(axis=0)
+            x, y = ((2 * pixels - low - high) / np.maximum(high - low, 1e-12)).T
             columns = np.stack([x**i * y**k for i, k in powers], axis=1)
-            # The affine part of the polynomials is in the homography, too.
-            free = 2 * len(plane) - 2 * len(powers) - (OF_HOMOGRAPHY - 6)
-            return off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0], free
+            # What another homography would change is in the polynomials, too.
+            return off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0], 2 * (
+                len(plane) - len(powers)
+            )
     return off, 2 * len(plane) - OF_HOMOGRAPHY
 
 
