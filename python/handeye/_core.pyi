@@ -158,24 +158,29 @@ def fit_corners(
     directions: ArrayLike,
     curvatures: ArrayLike,
     radii: ArrayLike,
+    beyonds: ArrayLike,
     bands: ArrayLike,
+    turns: ArrayLike,
     is_crossing: bool,
     rough: bool,
-) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64]]:
+) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64]]:
     """Corners (N, 2) fitted to grey values; NaN where there is none near the guess.
 
     Also the covariances (N, 2, 2) of the places for residuals of one grey value, the root mean squares (N,)
-    of the residuals in the smoothed picture, and the contrasts (N,).
+    of the residuals in the smoothed picture, the contrasts (N,), and the deviations (N,) of the Gaussian that
+    blurs the edges of the smoothed picture, in pixels.
 
     `image` (H, W) is contiguous. `places` (N, 2) are guesses, `directions` (N, 2, 2) those of the two edges,
-    `curvatures` (N, 2) theirs in 1 / px towards the normals (-sin, cos); `radii` (N,) are free of other edges
-    and `bands` (N,) the distances from the edges, in pixels, beyond which there is something else. At a
-    crossing diagonal parts are equal and the light may change; else the four parts may be of any grey. A
-    `rough` fit ends near the place, as is enough where it tells another fit where to begin.
+    `curvatures` (N, 2) theirs in 1 / px towards the normals (-sin, cos). `radii` (N,) are free of other
+    edges, and `beyonds` (N,) away from where both directions lead; `bands` (N,) are the distances from the
+    edges, in pixels, beyond which there is something else; `turns` (N,) the standard deviations of the
+    directions in radians, infinite where those are only guesses. At a crossing diagonal parts are equal and
+    the light may change; else the four parts may be of any grey. A `rough` fit ends near the place, as is
+    enough where it tells another fit where to begin.
 
     >>> image = np.full((40, 40), 200, np.uint8)
     >>> image[:20, :20] = image[20:, 20:] = 50  # a crossing between pixels 19 and 20
-    >>> guess = [[19.0, 20.0]], [[[1.0, 0.0], [0.0, 1.0]]], [[0.0, 0.0]], [8.0], [4.0]
+    >>> guess = [[19.0, 20.0]], [[[1.0, 0.0], [0.0, 1.0]]], [[0.0, 0.0]], [8.0], [8.0], [4.0], [np.inf]
     >>> np.round(_core.fit_corners(image, *guess, is_crossing=True, rough=False)[0], 2).tolist()
     [[19.5, 19.5]]
     """

@@ -71,8 +71,27 @@ def test_grey_values_that_are_not_proportional_to_light_shift_no_marker(
     image = np.rint(255 * light**gamma).astype(np.uint8)
     found = detect(image, target)
     assert isinstance(found, Detection), found
-    assert board.rms_px(found) < 0.08
+    assert board.rms_px(found) < 0.03
     assert board.rms_px(detect(cv2.GaussianBlur(board.picture(), (0, 0), 0.8), target)) < 0.06
+
+
+def test_bits_next_to_a_blurred_side_do_not_move_it() -> None:
+    board = scene(AprilGrid(5, 6, 0.035, 0.3, border_bits=1), turn=(0.2, -0.3, 0.1), share=0.5)
+    assert board.rms_px(detect(board.picture(blur_px=1.2), board.target)) < 0.028
+
+
+def test_all_corners_tell_the_directions_of_edges_in_noise() -> None:
+    board = scene(AprilGrid(5, 6, 0.035, 0.3, border_bits=1), turn=(0.2, -0.3, 0.1), share=0.5)
+    assert board.rms_px(detect(board.picture(3, blur_px=0.6, noise=3.0), board.target)) < 0.026
+
+
+def test_a_strong_lens_does_not_count_as_noise() -> None:
+    board = scene(TARGETS["charuco"], CAMERAS["brown_conrady_4"], turn=TURNS[0], share=0.6)
+    found = detect(board.picture(blur_px=0.8, noise=0.5), board.target)
+    assert isinstance(found, Detection), found
+    assert found.sigmas_px is not None
+    assert len(found) < 40
+    assert np.median(found.sigmas_px) < 0.006
 
 
 @pytest.mark.parametrize("name", ["chessboard", "circles", "charuco", "april grid"])

@@ -41,8 +41,9 @@ pub fn picture<'a, T: numpy::Element + Copy + Into<f32>>(
     Picture::new(grey, width, height).map_err(|e| to_python(py, e))
 }
 
-/// Places, covariances of them for residuals of one grey value, misfits and contrasts.
+/// Places, covariances of them for residuals of one grey value, misfits, contrasts and blurs.
 type Fits<'py> = (
+    Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyArrayDyn<f64>>,
@@ -58,7 +59,9 @@ fn fit_corners<'py>(
     directions: Array<'py>,
     curvatures: Array<'py>,
     radii: Array<'py>,
+    beyonds: Array<'py>,
     bands: Array<'py>,
+    turns: Array<'py>,
     is_crossing: bool,
     rough: bool,
 ) -> PyResult<Fits<'py>> {
@@ -66,9 +69,14 @@ fn fit_corners<'py>(
     let directions = convert::matrices::<2, 2>(py, "directions", &directions)?;
     let curvatures = convert::vectors::<2>(py, "curvatures", &curvatures)?;
     let radii = convert::scalars(py, "radii", &radii)?;
+    let beyonds = convert::scalars(py, "beyonds", &beyonds)?;
     let bands = convert::scalars(py, "bands", &bands)?;
+    let turns = convert::scalars(py, "turns", &turns)?;
     let n = places.len();
-    same_length(py, &[n, directions.len(), curvatures.len(), radii.len(), bands.len()])?;
+    same_length(
+        py,
+        &[n, directions.len(), curvatures.len(), radii.len(), beyonds.len(), bands.len(), turns.len()],
+    )?;
     let kind = if is_crossing { CornerKind::Crossing } else { CornerKind::Quadrants };
     let picture = picture(py, &image)?;
     let guesses = (0..n).map(|i| CornerGuess {
@@ -76,7 +84,9 @@ fn fit_corners<'py>(
         directions: [0, 1].map(|k| [directions[i][(k, 0)], directions[i][(k, 1)]]),
         curvatures: curvatures[i].into(),
         radius: radii[i],
+        beyond: beyonds[i],
         band: bands[i],
+        turn: turns[i],
     });
     let found: Vec<Option<Corner>> = py.core(|| {
         let mut fitter = CornerFitter::new(picture, kind);
@@ -89,6 +99,7 @@ fn fit_corners<'py>(
         convert::array(py, &[n, 2, 2], found.iter().flat_map(spread).collect()),
         convert::array(py, &[n], found.iter().map(|c| c.map_or(f64::NAN, |c| c.misfit)).collect()),
         convert::array(py, &[n], found.iter().map(|c| c.map_or(f64::NAN, |c| c.contrast)).collect()),
+        convert::array(py, &[n], found.iter().map(|c| c.map_or(f64::NAN, |c| c.blur)).collect()),
     ))
 }
 

@@ -17,11 +17,13 @@ from handeye.detection.base import (
 )
 from handeye.detection.corner_fit import (
     ASTRAY_PX,
+    BAND_SHARE,
     FEW,
     WIDE_PX,
     CornerFits,
     CornerKind,
     astray,
+    clear_bands,
     corner_fits,
     curvatures,
     nearer,
@@ -46,11 +48,10 @@ from handeye.types.arrays import FloatArray
 FEWEST_CORNERS = 4
 # Markers read where they are expected.
 FEWEST_MARKERS = 2
-# Part of a square that the window of a corner may take, and of the way to a marker that its strips may.
+# Part of a square that the window of a corner may take.
 WINDOW_SHARE = 0.7
 # A corner is off from where those around it put it by no more than this share of a square.
 OFF_SHARE = 0.02
-BAND_SHARE = 0.8
 # What the wrong one of two layouts looks like.
 _MAY_BE_LAYOUT = (Reason.INCONSISTENT, Reason.INCOMPLETE)
 
@@ -114,7 +115,8 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         corners = np.asarray(found, dtype=np.float64).reshape(-1, 2)
         numbers = np.asarray(found_ids, dtype=np.int64).ravel()
         steps = _steps(corners, places, seen)
-        rough = _measured(image, target, corners, steps, rough=True).places
+        near = _measured(image, target, corners, steps, rough=True)
+        rough = near.places
         good = np.isfinite(rough).all(axis=1)
         numbers, rough, steps = numbers[good], rough[good], steps[good]
         # Once more: all corners together tell the directions of edges better than a marker does.
@@ -123,7 +125,7 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         if lens is not None:
             steps = lens.steps(plane, 0.1 * target.square_m)
         bends = curvatures(lens, plane, target.square_m)
-        sharp = _measured(image, target, rough, steps, bends)
+        sharp = _measured(image, target, rough, steps, bends, near.usual_blur_px)
         good = np.flatnonzero(~sharp.spoilt())
         # What lies in front of the board has edges, too: markers and corners around know better.
         around = np.concatenate([sharp.places[good], seen.reshape(-1, 2)])
@@ -160,11 +162,11 @@ def confirm(image: Image, target: Charuco, board: Aligned) -> Detection | None:
     steps = board.steps(plane)
     band = BAND_SHARE * (target.square_m - target.marker_m) / 2 * np.linalg.norm(steps, axis=2).min()
     some = spread(len(corners), FEW if band >= WIDE_PX else len(corners))
-    near = _measured(image, target, corners[some], steps[some], rough=True).places
+    near = _measured(image, target, corners[some], steps[some], rough=True)
     # Then it is known well enough where all are, so that where they were put matters no more.
-    again, steps = nearer(plane, corners, steps, some, near)
+    again, steps = nearer(plane, corners, steps, some, near.places)
     bends = curvatures(_core.PlaneMap.fitted(plane, again), plane, target.square_m)
-    sharp = _measured(image, target, again, steps, bends)
+    sharp = _measured(image, target, again, steps, bends, near.usual_blur_px)
     good = ~sharp.spoilt() & ~astray(
         sharp.places, corners, target.square_m * np.linalg.norm(steps, axis=2).min(axis=1)
     )
@@ -192,6 +194,7 @@ def _measured(
     corners: FloatArray,
     steps: FloatArray,
     bends: FloatArray | None = None,
+    blur_px: float = 0.0,
     rough: bool = False,
 ) -> CornerFits:
     """Return the corners (N) as fitted; `bends` (N, 2) are the curvatures of the edges along both axes."""
@@ -209,6 +212,6 @@ def _measured(
         WINDOW_SHARE * target.square_m * scale,
         CornerKind.CROSSING,
         bends,
-        bands=BAND_SHARE * free * scale,
+        bands=clear_bands(free * scale, blur_px),
         rough=rough,
     )

@@ -18,6 +18,9 @@ from handeye.types.arrays import FloatArray, IndexArray
 
 # Half the width of the strip along each edge that is looked at.
 BAND_PX = 4.0
+# The strip stays away from the next edges by so many deviations of the blur, at least and at most these
+# shares of what is free.
+AWAY_IN_BLURS, NARROWEST_SHARE, BAND_SHARE = 2.0, 0.2, 0.8
 # Corners further than this from where others put them are not what they seem; where a board is near, so that
 # a pitch is many pixels, further than a share of it.
 ASTRAY_PX, ASTRAY_SHARE = 1.5, 0.06
@@ -122,12 +125,21 @@ class CornerFits:
         (N,) root mean squares of the residuals, in grey values of the smoothed picture.
     contrasts
         (N,) grey steps across the edges.
+    blurs
+        (N,) standard deviations of the Gaussian that blurs the edges of the smoothed picture, in pixels.
     """
 
     places: FloatArray
     spreads: FloatArray
     misfits: FloatArray
     contrasts: FloatArray
+    blurs: FloatArray
+
+    @property
+    def usual_blur_px(self) -> float:
+        """What blurs most of the edges; 0 where no corner was fitted."""
+        there = np.isfinite(self.blurs)
+        return float(np.median(self.blurs[there])) if there.any() else 0.0
 
     @property
     def sigmas_px(self) -> FloatArray:
@@ -147,6 +159,14 @@ class CornerFits:
         return ~(self.misfits <= np.maximum(MISFIT_RATIO * usual, MISFIT_SHARE * self.contrasts))
 
 
+def clear_bands(free: FloatArray, blur_px: float) -> FloatArray:
+    """Return half the widths (N,) of the strips along edges that are free (N,) of others up to so far.
+
+    They stay away from those by what blurs all edges, but not further than a share of what is free.
+    """
+    return np.clip(free - AWAY_IN_BLURS * blur_px, NARROWEST_SHARE * free, BAND_SHARE * free)
+
+
 def corner_fits(
     image: Image,
     corners: FloatArray,
@@ -155,6 +175,8 @@ def corner_fits(
     kind: CornerKind,
     curvatures: FloatArray | None = None,
     bands: FloatArray | None = None,
+    turns: FloatArray | None = None,
+    beyonds: FloatArray | None = None,
     rough: bool = False,
 ) -> CornerFits:
     """Return corners as fitted from first guesses.
@@ -174,6 +196,10 @@ def corner_fits(
         edges. None for straight ones.
     bands
         (N,) distance from the edges, in pixels, beyond which there is something else; None for nothing.
+    turns
+        (N,) standard deviations of the directions in radians; None where they are only guesses.
+    beyonds
+        (N,) the radius beyond each corner, away from where both directions lead; None for the same.
     rough
         Whether to end near the places, as is enough to begin once more from there.
     """
@@ -183,7 +209,9 @@ def corner_fits(
         directions,
         np.zeros((len(corners), 2)) if curvatures is None else curvatures,
         radii,
+        radii if beyonds is None else beyonds,
         np.full(len(corners), BAND_PX) if bands is None else bands,
+        np.full(len(corners), np.inf) if turns is None else turns,
         kind is CornerKind.CROSSING,
         rough,
     )
@@ -201,4 +229,4 @@ def fit_corners(
     rough: bool = False,
 ) -> FloatArray:
     """Return the places (N, 2) of `corner_fits`, NaN where the fit fails."""
-    return corner_fits(image, corners, directions, radii, kind, curvatures, bands, rough).places
+    return corner_fits(image, corners, directions, radii, kind, curvatures, bands, rough=rough).places

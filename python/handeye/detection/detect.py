@@ -21,7 +21,7 @@ from handeye.types.target import MarkerCorners
 
 SMALLEST_SIDE_PX = 24
 # To be raised with every change of what is detected, or where.
-VERSION = 9
+VERSION = 10
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,8 @@
 A camera whose grey values are not proportional to the light moves the edges of what it sees a little out of
 focus, ink that ran moves those of the print: dark parts come out larger or smaller all around. Where four
 squares meet that changes nothing; a marker's corners go outwards or inwards, all of a picture by the same
-distance, which shows against the spaces between the markers.
+distance, which shows against the spaces between the markers. Where the blur reaches from the bits of a
+code to its marker's sides, light ones move those, which shows likewise.
 """
 
 import numpy as np
@@ -24,7 +25,9 @@ def unknown_shift_px(count: int) -> float:
     return USUAL_PX if count < FEWEST else 0.0
 
 
-def without_edge_shift(plane: FloatArray, pixels: FloatArray, sides: FloatArray) -> FloatArray:
+def without_edge_shift(
+    plane: FloatArray, pixels: FloatArray, sides: FloatArray, lights: FloatArray
+) -> FloatArray:
     """Return corners (N, 2) where they would be had the edges not moved.
 
     Parameters
@@ -33,23 +36,36 @@ def without_edge_shift(plane: FloatArray, pixels: FloatArray, sides: FloatArray)
         (N, 2) corners on the board and in the image.
     sides
         (N, 2, 2) unit directions in the image of the two sides of the marker that begin at each corner.
+    lights
+        (N, 2) how light the bits are beside each of these sides: where a picture is blurred so far that they
+        show at the side, they move that, too.
     """
     if len(plane) < FEWEST:
         return pixels
     first, second = sides[:, 0], sides[:, 1]
     sine = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
-    # Both edges moved outwards by one pixel.
-    outwards = -(first + second) / np.maximum(sine, 1e-3)[:, np.newaxis]
-    here, there = off_plane(plane, pixels), off_plane(plane, pixels - outwards)
-    if here is None or there is None:
+    shares = np.stack([np.ones_like(lights), lights - lights.mean()], axis=2)
+    # Where corners go as the one and the other edge move outwards by one pixel times their shares.
+    moves = -np.stack([second, first], axis=1) / np.maximum(sine, 1e-3)[:, np.newaxis, np.newaxis]
+    outwards = np.asarray(np.einsum("nsk,nsi->kni", shares, moves), dtype=np.float64)
+    here = off_plane(plane, pixels)
+    there = [off_plane(plane, pixels - move) for move in outwards]
+    if here is None or any(each is None for each in there):
         return pixels
-    # What the shift changes and no view of a flat board does.
+    # What the shifts change and no view of a flat board does.
     off, freedom = here
-    change = off - there[0]
-    weight = max(float((change**2).sum()), 1e-12)
-    shift = float((off * change).sum()) / weight
-    left = off - shift * change
-    sigma = float(np.sqrt((left**2).sum() / max(freedom - 1, 1) / weight))
-    if not LEAST_IN_SIGMAS * sigma < abs(shift) <= LARGEST_PX:
-        return pixels
-    return pixels - shift * outwards
+    changes = np.stack([(off - each[0]).ravel() for each in there if each is not None], axis=1)
+    chosen = np.arange(len(outwards))
+    while len(chosen):
+        part = changes[:, chosen]
+        inverse = np.asarray(np.linalg.pinv(part.T @ part, hermitian=True), dtype=np.float64)
+        shifts = inverse @ part.T @ off.ravel()
+        left = off.ravel() - part @ shifts
+        sigmas = np.sqrt(float(left @ left) / max(freedom - len(chosen), 1) * np.diag(inverse))
+        good = (np.abs(shifts) > LEAST_IN_SIGMAS * sigmas) & (np.abs(shifts) <= LARGEST_PX)
+        if good.all():
+            return pixels - np.tensordot(shifts, outwards[chosen], axes=1)
+        chosen = np.delete(
+            chosen, np.argmin(np.where(good, np.inf, np.abs(shifts) / np.maximum(sigmas, 1e-12)))
+        )
+    return pixels

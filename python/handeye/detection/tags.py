@@ -9,11 +9,13 @@ from handeye import _core
 from handeye.detection.base import Detection, Image, NotFound, Reason, inside, ordered
 from handeye.detection.corner_fit import (
     ASTRAY_PX,
+    BAND_SHARE,
     FEW,
     WIDE_PX,
     CornerFits,
     CornerKind,
     astray,
+    clear_bands,
     corner_fits,
     curvatures,
     nearer,
@@ -32,21 +34,27 @@ from handeye.detection.markers import (
     find_markers,
     from_neighbours,
 )
-from handeye.detection.registration import Aligned
+from handeye.detection.registration import Aligned, drawn
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.target import MarkerCorners
 from handeye.types.target.artwork import Squares
 from handeye.types.target.dictionaries import marker_bits
 
 # How far the window of a corner stays from the next edge, which is blurred, too: so many pixels, but at least
-# and at most these shares of the space between markers. And the part of the border that its strips may take.
+# and at most these shares of the space between markers. Along the sides it takes a share of those, unless
+# squares touch the corners: edges that moved do so on both sides then, and a window as wide on both leaves
+# the corner where it is.
 AWAY_PX, LEAST_AWAY, MOST_AWAY = 4.5, 0.2, 0.4
-BAND_SHARE = 0.8
+ALONG_SHARE = 0.5
 # Tags read where they are expected.
 FEWEST_TAGS = 2
 # So many markers do not tell which of their corners is none, but their sides do; fitted corners are no
 # further from where sides meet than this many of the latter's deviations.
 FEW_MARKERS, MEETING_SIGMAS = 3, 3.0
+# Numbers of the map from a board to a picture, and the least deviation of the directions that it tells.
+OF_MAP, LEAST_TURN = 22, 1e-3
+# Cells of the code along a side that show at its corner where they are blurred.
+CELLS_BESIDE = 4
 # Tried until all tags are found, the last only if some are; one leaves the ink as it is.
 THINNING_PX = (3, 1, 5)
 
@@ -54,6 +62,17 @@ THINNING_PX = (3, 1, 5)
 @lru_cache(maxsize=16)
 def _bits(target: MarkerCorners) -> Bits:
     return Bits.of(target)
+
+
+@lru_cache(maxsize=16)
+def _lights(target: MarkerCorners) -> FloatArray:
+    """Return how light (P, 2) the bits are beside both sides of a marker that begin at each corner."""
+    along = _sides(target, np.arange(target.point_count // 4))
+    cell = _side(target) / (marker_bits(target.dictionary) + 2 * target.border_bits)
+    steps = cell * (np.arange(CELLS_BESIDE) + 0.5)[:, np.newaxis]
+    inwards = cell * (target.border_bits + 0.5) * along[:, ::-1, np.newaxis]
+    places = target.points[:, np.newaxis, np.newaxis, :2] + along[:, :, np.newaxis] * steps + inwards
+    return drawn(target, places).mean(axis=-1)
 
 
 def find(image: Image, target: MarkerCorners) -> Detection | NotFound:
@@ -81,6 +100,7 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
     seen = np.where(astray[:, np.newaxis], expected, seen.reshape(-1, 2)).reshape(-1, 4, 2)
     side = _side(target)
     near = _measured(image, target, tags, seen, None, rough=True)
+    blur = near.usual_blur_px
     is_few = len(tags) <= FEW_MARKERS
     rough = _by_sides(image, target, seen, near)[0] if is_few else near.places
     good = np.flatnonzero(np.isfinite(rough[:, 0]))
@@ -90,7 +110,7 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
     # Once more: all corners together tell the directions of edges better than a tag does.
     again = np.where(np.isfinite(rough), rough, seen.reshape(-1, 2)).reshape(-1, 4, 2)
     steps = lens.steps(plane, 0.1 * side)
-    fits = _measured(image, target, tags, again, steps, lens)
+    fits = _measured(image, target, tags, again, steps, lens, blur)
     places, sigmas = fits.places, fits.sigmas_px
     if is_few:
         places, sigmas = _by_sides(image, target, again, fits)
@@ -101,9 +121,11 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
     good = good[np.linalg.norm(expected - places[good], axis=1) <= ASTRAY_PX]
     if len(good) < 4:
         return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
-    sharp = without_edge_shift(plane[good], places[good], _unit(_sides(target, tags) @ steps)[good])
+    there = points.ravel()[good]
+    unit = _unit(_sides(target, tags) @ steps)[good]
+    sharp = without_edge_shift(plane[good], places[good], unit, _lights(target)[there])
     sigmas = np.hypot(sigmas[good], unknown_shift_px(len(good)))
-    return ordered(target, points.ravel()[good], sharp, sigmas)
+    return ordered(target, there, sharp, sigmas)
 
 
 def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | None:
@@ -121,11 +143,12 @@ def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | 
     tags = np.flatnonzero(read)
     few = spread(len(tags), FEW // 4 if band >= WIDE_PX else len(tags))
     some = (4 * few[:, np.newaxis] + np.arange(4)).ravel()
-    near = _measured(image, target, tags[few], places[read][few], steps[some], rough=True).places
+    begun = _measured(image, target, tags[few], places[read][few], steps[some], rough=True)
+    near, blur = begun.places, begun.usual_blur_px
     # Then it is known well enough where all are, so that where they were put matters no more.
     again, steps = nearer(plane, corners, steps, some, near)
     lens = _core.PlaneMap.fitted(plane, again)
-    fits = _measured(image, target, tags, again.reshape(-1, 4, 2), steps, lens)
+    fits = _measured(image, target, tags, again.reshape(-1, 4, 2), steps, lens, blur)
     places_px, sigmas = fits.places, fits.sigmas_px
     good = ~fits.spoilt()
     if len(tags) <= FEW_MARKERS:
@@ -134,7 +157,8 @@ def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | 
     good &= ~astray(places_px, corners, side * np.linalg.norm(steps, axis=2).min(axis=1))
     if good.sum() < max(4, LEAST_SHARE * 4 * expected.sum()):
         return None
-    sharp = without_edge_shift(plane[good], places_px[good], _unit(_sides(target, tags) @ steps)[good])
+    unit = _unit(_sides(target, tags) @ steps)[good]
+    sharp = without_edge_shift(plane[good], places_px[good], unit, _lights(target)[ids[good]])
     return ordered(target, ids[good], sharp, np.hypot(sigmas[good], unknown_shift_px(len(good))))
 
 
@@ -144,7 +168,7 @@ def _markers(image: Image, target: MarkerCorners) -> Seen:
     The squares that Kalibr prints between tags touch them at their corners, so that outlines may merge; in a
     picture with thinner ink they are apart.
     """
-    if not any(isinstance(layer, Squares) for layer in target.artwork().layers):
+    if not _is_touched(target):
         return find_markers(image, target.dictionary, target.border_bits)
     ids, seen, repeated = NO_IDS, np.zeros((0, 4, 2)), NO_IDS
     for size in THINNING_PX:
@@ -184,6 +208,11 @@ def _by_sides(
     return np.where(agree[:, np.newaxis], fits.places, places), np.where(agree, fits.sigmas_px, sigmas)
 
 
+def _is_touched(target: MarkerCorners) -> bool:
+    """Tell whether squares touch the corners of the markers."""
+    return any(isinstance(layer, Squares) for layer in target.artwork().layers)
+
+
 def _side(target: MarkerCorners) -> float:
     """Return the side of a marker in metres."""
     return float(np.linalg.norm(target.points[1] - target.points[0]))
@@ -202,6 +231,19 @@ def _sides(target: MarkerCorners, markers: IndexArray) -> FloatArray:
     return sides.reshape(-1, 2, 2) / _side(target)
 
 
+def _turns(outlined: FloatArray, told: FloatArray) -> FloatArray:
+    """Return the deviations (N,) of the directions told of edges, as the markers' own outlines have them.
+
+    Both are (N, 2, 2) unit vectors, four corners of each marker in turn.
+    """
+    free = len(told) - OF_MAP / 2
+    if len(told) <= 4 * FEW_MARKERS or free <= 0:
+        return np.full(len(told), np.inf)
+    off = np.linalg.det(np.stack([outlined, told], axis=2)) ** 2 * len(told) / free
+    own = off.reshape(-1, 8).mean(axis=1)
+    return np.sqrt(np.repeat(np.maximum(own, off.mean()), 4)).clip(LEAST_TURN)
+
+
 def _unit(directions: FloatArray) -> FloatArray:
     return directions / np.linalg.norm(directions, axis=2, keepdims=True)
 
@@ -213,6 +255,7 @@ def _measured(
     tags: FloatArray,
     steps: FloatArray | None,
     lens: _core.PlaneMap | None = None,
+    blur_px: float = 0.0,
     rough: bool = False,
 ) -> CornerFits:
     """Return the corners (4 M) of markers (M,) with corners (M, 4, 2) as fitted.
@@ -223,21 +266,28 @@ def _measured(
     after = np.roll(tags, -1, axis=1) - tags
     before = np.roll(tags, 1, axis=1) - tags
     lengths = np.minimum(np.linalg.norm(after, axis=2), np.linalg.norm(before, axis=2)).reshape(-1)
-    directions = np.stack([after, before], axis=2).reshape(-1, 2, 2)
+    outlined = np.stack([after, before], axis=2).reshape(-1, 2, 2)
     sides = _sides(target, markers)
-    directions = _unit(directions if steps is None else sides @ steps)
+    directions = _unit(outlined if steps is None else sides @ steps)
     plane = target.points[:, :2].reshape(-1, 4, 2)[markers].reshape(-1, 2)
     # Sides run along the axes of the board, or against them.
     bends = (sides @ curvatures(lens, plane, target.spacing_m)[:, :, np.newaxis])[..., 0]
+    turns = None if steps is None else _turns(_unit(outlined), directions)
     height = lengths * np.abs(np.linalg.det(directions))
     free = target.gap_m / _side(target) * height
+    beyond = free - np.clip(AWAY_PX, LEAST_AWAY * free, MOST_AWAY * free)
+    radii = (
+        np.maximum(beyond, ALONG_SHARE * height) if steps is not None and not _is_touched(target) else beyond
+    )
     return corner_fits(
         image,
         tags.reshape(-1, 2),
         directions,
-        free - np.clip(AWAY_PX, LEAST_AWAY * free, MOST_AWAY * free),
+        radii,
         CornerKind.QUADRANTS,
         bends,
-        bands=BAND_SHARE * _border(target) * height,
+        beyonds=beyond,
+        bands=clear_bands(_border(target) * height, blur_px),
+        turns=turns,
         rough=rough,
     )

@@ -25,6 +25,9 @@ const ROUGH_RADIUS_PX: f64 = 16.0;
 const BLUR_RANGE_PX: [f64; 2] = [0.25, 4.0];
 /// Least grey step across an edge.
 const LEAST_CONTRAST: f64 = 4.0;
+/// Residuals of a smoothed picture are like their neighbours: variances are larger by this factor than independent
+/// ones would make them.
+const CORRELATED: f64 = 4.0;
 /// Least share of the window that lies inside the picture.
 const LEAST_INSIDE: f64 = 0.75;
 
@@ -48,8 +51,35 @@ pub struct Corner {
     pub spread: [[f64; 2]; 2],
     /// Root mean square of the residuals, in grey values of the smoothed picture.
     pub misfit: f64,
+    /// Standard deviation of the Gaussian that blurs the edges of the smoothed picture, in pixels.
+    pub blur: f64,
     /// Grey step across the edges.
     pub contrast: f64,
+}
+
+/// Directions of the edges as others tell them.
+struct Told {
+    angles: [f64; 2],
+    /// Weight of their squared differences, for each square of a grey value that the residuals cost.
+    per_cost: f64,
+}
+
+impl Told {
+    /// What differences from the directions told cost, where residuals cost so much.
+    fn cost(&self, cost: f64, p: &Parameters) -> f64 {
+        let [a, b] = [p[FIRST] - self.angles[0], p[SECOND] - self.angles[1]];
+        cost * self.per_cost * (a * a + b * b)
+    }
+
+    /// Adds the directions told to equations at some parameters.
+    fn join(&self, equations: &mut Equations, p: &Parameters) {
+        let weight = equations.cost * self.per_cost;
+        equations.cost += self.cost(equations.cost, p);
+        for (i, angle) in [FIRST, SECOND].into_iter().zip(self.angles) {
+            equations.normal[(i, i)] += weight;
+            equations.right[i] += weight * (angle - p[i]);
+        }
+    }
 }
 
 /// Fits corners in a picture, one after the other.
@@ -83,7 +113,8 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
         }
         let largest = if rough { ROUGH_RADIUS_PX } else { RADIUS_RANGE_PX[1] };
         let radius = guess.radius.clamp(RADIUS_RANGE_PX[0], largest);
-        let guess = CornerGuess { radius, band: guess.band.min(BAND_PX), ..*guess };
+        let beyond = guess.beyond.clamp(RADIUS_RANGE_PX[0], radius);
+        let guess = CornerGuess { radius, beyond, band: guess.band.min(BAND_PX), ..*guess };
         let share_inside = self.window.lay(self.unit, &self.picture, &guess);
         if share_inside < LEAST_INSIDE {
             return None;
@@ -98,7 +129,12 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
         start[LOG_BLUR] = self.log_blur;
         self.solve_greys(&mut start)?;
         let tolerance = if rough { ROUGH_TOLERANCE_PX } else { STEP_TOLERANCE_PX };
-        let (fit, equations) = self.minimised(start, guess.curvatures, tolerance)?;
+        let weight: f64 = self.window.samples.root.iter().map(|root| root * root).sum::<f64>().max(1.0);
+        let told = Told {
+            angles: [start[FIRST], start[SECOND]],
+            per_cost: CORRELATED / (weight * guess.turn * guess.turn),
+        };
+        let (fit, mut equations) = self.minimised(start, guess.curvatures, &told, tolerance)?;
         let moved = (fit[X] - start[X]).hypot(fit[Y] - start[Y]);
         let good = moved <= (0.25 * radius).max(1.5)
             && fit[PRODUCT].abs() * 2.0 >= LEAST_CONTRAST
@@ -109,12 +145,14 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
         self.log_blur = fit[LOG_BLUR];
         let ridge =
             SMatrix::<f64, N, N>::from_diagonal(&equations.normal.diagonal().map(|d| 1e-9 * d + 1e-12));
+        let cost = equations.cost;
+        told.join(&mut equations, &fit);
         let covariance = (equations.normal + ridge).cholesky()?.inverse();
-        let weight: f64 = self.window.samples.root.iter().map(|root| root * root).sum();
         Some(Corner {
             place: [origin[0] + fit[X], origin[1] + fit[Y]],
             spread: [X, Y].map(|i| [X, Y].map(|k| covariance[(i, k)])),
-            misfit: (equations.cost.max(0.0) / weight.max(1.0)).sqrt(),
+            misfit: (cost.max(0.0) / weight).sqrt(),
+            blur: fit[LOG_BLUR].exp(),
             contrast: 2.0 * fit[PRODUCT].abs(),
         })
     }
@@ -136,6 +174,7 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
         &self,
         mut p: Parameters,
         bends: [f64; 2],
+        told: &Told,
         tolerance: f64,
     ) -> Option<(Parameters, Equations)> {
         let mut current = self.equations(&p, bends);
@@ -143,7 +182,9 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
         for _ in 0..MAX_ITERATIONS {
             let ridge =
                 SMatrix::<f64, N, N>::from_diagonal(&current.normal.diagonal().map(|d| damping * d + 1e-9));
-            let mut step = (current.normal + ridge).cholesky()?.solve(&current.right);
+            let mut joined = current;
+            told.join(&mut joined, &p);
+            let mut step = (joined.normal + ridge).cholesky()?.solve(&joined.right);
             step[X] = step[X].clamp(-1.0, 1.0);
             step[Y] = step[Y].clamp(-1.0, 1.0);
             step[LOG_BLUR] = step[LOG_BLUR].clamp(-0.5, 0.5);
@@ -155,7 +196,7 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
                 break;
             }
             let tried = self.equations(&trial, bends);
-            if tried.cost <= current.cost {
+            if tried.cost + told.cost(current.cost, &trial) <= joined.cost {
                 (p, current) = (trial, tried);
                 damping /= 10.0;
             } else {
@@ -218,7 +259,15 @@ mod tests {
 
     fn guess(place: [f64; 2], angles: [f64; 2]) -> CornerGuess {
         let directions = angles.map(|angle| [angle.cos(), angle.sin()]);
-        CornerGuess { place, directions, curvatures: [0.0; 2], radius: 12.0, band: 4.0 }
+        CornerGuess {
+            place,
+            directions,
+            curvatures: [0.0; 2],
+            radius: 12.0,
+            beyond: 12.0,
+            band: 4.0,
+            turn: f64::INFINITY,
+        }
     }
 
     #[test]
@@ -241,6 +290,40 @@ mod tests {
                 assert!(error < 1e-3, "{kind:?} {place:?}: {error}");
             }
         }
+    }
+
+    #[test]
+    fn directions_that_are_told_hold_the_edges_as_firmly_as_they_are_known() {
+        let grey = drawn([20.0, 20.0], [0.1, 1.6], 1.1, [150.0, 40.0, -40.0, 40.0]);
+        let picture = Picture::new(&grey, SIDE, SIDE).unwrap();
+        let wrong = guess([20.0, 20.0], [0.15, 1.6]);
+        let off = |turn: f64| {
+            let found =
+                CornerFitter::new(picture, CornerKind::Quadrants).fit(&CornerGuess { turn, ..wrong }, false);
+            let place = found.unwrap().place;
+            (place[0] - 20.0).hypot(place[1] - 20.0)
+        };
+        assert!(off(f64::INFINITY) < 1e-3);
+        assert!(off(0.05) < 0.01, "{}", off(0.05));
+        assert!(off(1e-6) > 0.05, "{}", off(1e-6));
+    }
+
+    #[test]
+    fn what_lies_beyond_a_corner_is_left_out() {
+        let mut grey = drawn([20.0, 20.0], [0.0, 1.57], 1.1, [150.0, 40.0, -40.0, 40.0]);
+        for (i, value) in grey.iter_mut().enumerate() {
+            if i % SIDE < 12 {
+                *value = 20.0;
+            }
+        }
+        let picture = Picture::new(&grey, SIDE, SIDE).unwrap();
+        let off = |beyond: f64| {
+            let start = CornerGuess { beyond, ..guess([20.0, 20.0], [0.0, 1.57]) };
+            let found = CornerFitter::new(picture, CornerKind::Quadrants).fit(&start, false);
+            found.map_or(f64::NAN, |c| (c.place[0] - 20.0).hypot(c.place[1] - 20.0))
+        };
+        assert!(off(4.0) < 1e-3, "{}", off(4.0));
+        assert!(!(off(12.0) < 1e-2), "{}", off(12.0));
     }
 
     #[test]

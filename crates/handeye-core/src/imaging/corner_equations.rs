@@ -61,6 +61,7 @@ impl Samples {
 }
 
 /// `J' W J`, `J' W r` and the weighted sum of squares.
+#[derive(Clone, Copy)]
 pub(super) struct Equations {
     pub normal: SMatrix<f64, N, N>,
     pub right: SVector<f64, N>,

@@ -11,13 +11,19 @@ pub struct CornerGuess {
     pub curvatures: [f64; 2],
     /// Radius in pixels in which there are no other edges.
     pub radius: f64,
+    /// The same beyond the corner, away from where the two directions lead.
+    pub beyond: f64,
     /// Distance from the edges in pixels beyond which there is something else.
     pub band: f64,
+    /// Standard deviation of the directions in radians; infinite where nothing else tells them.
+    pub turn: f64,
 }
 
 impl CornerGuess {
     pub(super) fn is_usable(&self) -> bool {
         let numbers = [self.place, self.directions[0], self.directions[1], self.curvatures];
-        numbers.iter().flatten().chain([&self.radius, &self.band]).all(|x| x.is_finite()) && self.radius > 0.0
+        numbers.iter().flatten().chain([&self.radius, &self.beyond, &self.band]).all(|x| x.is_finite())
+            && self.radius > 0.0
+            && self.turn > 0.0
     }
 }

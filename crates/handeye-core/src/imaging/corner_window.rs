@@ -212,7 +212,8 @@ impl Kernel for Weighing<'_> {
         let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
         let offset = self.offset.map(|x| simd.splat(x));
         let directions = self.guess.directions.map(|d| d.map(|x| simd.splat(x)));
-        let rim = simd.splat(self.guess.radius + 0.5);
+        let [rim, near_rim] = [self.guess.radius, self.guess.beyond].map(|x| simd.splat(x + 0.5));
+        let half = simd.splat(std::f64::consts::FRAC_1_SQRT_2);
         let strip = simd.splat(self.guess.band + 0.5);
         let (mut whole, mut inside) = (zero, zero);
         let Samples { x, y, root, .. } = self.samples;
@@ -222,7 +223,11 @@ impl Kernel for Weighing<'_> {
             // The smaller of two is the negative of the larger of their negatives. A soft rim, so that no pixel
             // leaps in or out as the corner moves.
             let near = (strip + (-first).max(-second)).max(zero);
-            let within = (rim - x.mul_add(x, y * y).sqrt()).max(zero);
+            let away = x.mul_add(x, y * y).sqrt();
+            let [along, beside] = directions.map(|d| d[0].mul_add(x, d[1] * y));
+            let ahead = along.max(beside) - half * away;
+            let rim = rim.keep_or(ahead.at_least(zero), near_rim);
+            let within = (rim - away).max(zero);
             let soft = (-(-near).max(-one)) * (-(-within).max(-one));
             let seen = simd.load(&root[at..]);
             whole = whole + soft.keep(seen.at_least(zero));
