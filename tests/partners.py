@@ -36,6 +36,11 @@ NEVER = 10_000
 # An arm turns that moves so far in so long; a simulated controller trembles at rest.
 TURNS_RAD, LOOK_S = 1e-3, 0.01
 Cable = tuple[Callable[[], None], Callable[[], None]]
+# What holds the joints of franky-sim: N m/rad and N m s/rad. Its own damping, 200 at the last three, is unstable
+# at its step of 1 ms (200 * 0.001 / 0.078 kg m2 > 2): once an abrupt stop has stirred joint 7, its torque jumps
+# between the bounds of 12 N m for good, nothing holds the joint, and it creeps. The time constant stays 0.1 s.
+STIFFNESS = (4500.0, 4500.0, 3500.0, 3500.0, 500.0, 500.0, 500.0)
+DAMPING = (450.0, 450.0, 350.0, 350.0, 50.0, 50.0, 50.0)
 
 
 @dataclass(frozen=True)
@@ -149,12 +154,13 @@ def simulated_franka() -> Iterator[tuple[str, Callable[[], np.ndarray], FciCable
     from franky_sim.base_simulator import BaseRobot
     from franky_sim.mujoco_simulator import MujocoSimulator
 
-    # It hands out its one pose and computes the next one into it: here it hands out copies.
+    # franky-sim 1.0.4 hands out its one pose and computes the next one into it: O_T_EE, the measured pose, comes
+    # out as that of the commanded joints, 0.1 deg beside the measured ones. Here it hands out copies.
     shared = BaseRobot.kinematics
     BaseRobot.kinematics = lambda self, q: pinocchio.SE3(shared(self, q))
     try:
         with MujocoSimulator(enable_visualization=False) as simulator:
-            model = simulator.add_robot()
+            model = simulator.add_robot(kp=STIFFNESS, kv=DAMPING)
             with sim.SimulationServer(simulator) as server:
                 server.run_async()
                 cable = FciCable(server.robot_servers[0])

@@ -27,6 +27,8 @@ from typing import Any
 import cv2
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+
 from handeye import extension
 from handeye.cameras.protocol import Frame
 from handeye.cli.boundary import run
@@ -37,6 +39,7 @@ from handeye.session import drivers
 from handeye.testing import MockCell
 from handeye.testing.universal_robots import MockUniversalRobot
 from handeye.types import Pose
+from partners import simulated_franka
 
 SPACE_MM = ("-1100", "-1100", "20", "1100", "1100", "1300")
 SERIAL = "0815-0000"
@@ -114,27 +117,16 @@ class Followed(Shown):
 def franka(_: argparse.Namespace, seed: int) -> Iterator[tuple[Shown, str, str]]:
     """Give a cell, the specification of its driver and the description of its arm."""
     import franky_sim  # noqa: PLC0415 - only where it is asked for
-    import pinocchio  # noqa: PLC0415 - comes with it
-    from franky_sim.base_simulator import BaseRobot  # noqa: PLC0415
-    from franky_sim.mujoco_simulator import MujocoSimulator  # noqa: PLC0415
 
-    # franky-sim 1.0.4 hands out its one pose and computes the next one into it: O_T_EE, the measured pose,
-    # comes out as that of the commanded joints, 0.1 deg beside the measured ones. Here it hands out copies.
-    shared = BaseRobot.kinematics
-    BaseRobot.kinematics = lambda self, q: pinocchio.SE3(shared(self, q))
     described = Path(franky_sim.__file__).parent / "assets" / "fr3_clean.urdf"
     cell = Followed(read_urdf(described), seed=seed)
-    with MujocoSimulator(enable_visualization=False) as simulator:
-        model = simulator.add_robot()
-        with franky_sim.SimulationServer(simulator) as server:
-            server.run_async()
-            address = f"{model.hostname},no-realtime"
-            driver = FrankaRobot(address)
-            start = cell.start_rad
-            driver.move_to(Goal("start.1", Pose(cell.arm.forward(start)), start, 1.0))
-            del driver
-            cell.qpos = lambda: np.array(model.inner_state.q)
-            yield cell, f"franka:{address}", str(described)
+    with simulated_franka() as (address, joints, _):
+        driver = FrankaRobot(address)
+        start = cell.start_rad
+        driver.move_to(Goal("start.1", Pose(cell.arm.forward(start)), start, 1.0))
+        driver.close()
+        cell.qpos = joints
+        yield cell, f"franka:{address}", str(described)
 
 
 @contextmanager

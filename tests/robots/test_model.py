@@ -137,6 +137,22 @@ def test_a_tool_moves_the_end() -> None:
     assert np.allclose(arm.with_flange(tool).forward(joints), arm.forward(joints) @ tool.matrix)
 
 
+def test_an_arm_can_be_limited_further() -> None:
+    arm = open_arm("ur5e")
+    theirs = np.where(np.arange(6)[:, None] == 2, [[-0.5, 0.4]], arm.limits * 2)
+    narrow = arm.limited(theirs)
+    assert np.array_equal(narrow.limits, np.where(np.arange(6)[:, None] == 2, [[-0.5, 0.4]], arm.limits))
+    assert np.array_equal(narrow.forward(np.ones(6)), arm.forward(np.ones(6)))
+    assert narrow.limited(arm.limits).fingerprint == narrow.fingerprint != arm.fingerprint
+    # It plans within them.
+    found, reached = narrow.inverse_all(arm.forward(np.random.default_rng(0).uniform(-2, 2, (50, 6))))
+    assert 0 < reached.sum() < 50
+    assert all(narrow.within_limits(q) for q in found[reached])
+    for wrong, words in ((arm.limits[:5], "shape"), (arm.limits + 20, "joint"), (arm.limits * np.nan, "joint")):
+        with pytest.raises(InputError, match=words):
+            arm.limited(wrong)
+
+
 def test_arms_travel_between_processes() -> None:
     arm = open_arm("lbr_iiwa_14")
     copy = pickle.loads(pickle.dumps(arm))

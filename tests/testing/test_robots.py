@@ -22,6 +22,8 @@ GOALS = CELL.goals()
 class SlowArm:
     """A driver as it should be: an arm that takes its time, on a link that can be cut."""
 
+    joint_limits: object = CELL.arm.limits
+
     def __init__(self) -> None:
         self.joints = np.array(CELL.start_rad)
         self.connected = True
@@ -294,6 +296,18 @@ class Coasts(SlowArm):
         return super().read_pose()
 
 
+class LimitsOfOneJoint(SlowArm):
+    joint_limits = ((-3.0, 3.0),)
+
+
+class LimitsTurnedRound(SlowArm):
+    joint_limits = np.fliplr(CELL.arm.limits)
+
+
+class LimitsInTurns(SlowArm):
+    joint_limits = CELL.arm.limits / 100
+
+
 BROKEN: list[tuple[type, str, str]] = [
     (NoStop, "test_has_the_methods", "lacks"),
     (Degrees, "test_ends_where_it_was_sent_and_says_so", "degrees"),
@@ -307,6 +321,9 @@ BROKEN: list[tuple[type, str, str]] = [
     (GoesAnyway, "test_refuses_what_it_cannot_reach", "must refuse"),
     (RefusesUnnamed, "test_refuses_what_it_cannot_reach", "motion_refused"),
     (MovesAndRefuses, "test_refuses_what_it_cannot_reach", "all the same"),
+    (LimitsOfOneJoint, "test_stands_within_the_limits_that_it_states", "of 6 joints"),
+    (LimitsTurnedRound, "test_stands_within_the_limits_that_it_states", "not below the highest"),
+    (LimitsInTurns, "test_stands_within_the_limits_that_it_states", "stands beyond them"),
     (StopFails, "test_stops_at_rest", "no connection"),
     (TooFast, "test_is_as_slow_as_asked", "at the speed of the goal"),
     (DeafToStop, "test_stops_in_mid_motion", "went on to its goal"),

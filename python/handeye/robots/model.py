@@ -157,6 +157,42 @@ class Arm:
         offsets = [joint.placement.translation for joint in self.joints[1:]]
         return float(sum(np.linalg.norm(o) for o in [*offsets, self.T_last_flange.translation]))
 
+    def limited(self, limits: ArrayLike) -> "Arm":
+        """Return the arm within its own limits and others (n, 2), lower and upper, radians or metres.
+
+        Raises
+        ------
+        InputError
+            Not two numbers for each joint, or ranges that leave a joint no way.
+
+        Examples
+        --------
+        >>> arm.limited(0.5 * arm.limits).within_limits(0.9 * arm.limits[:, 1])
+        False
+        """
+        theirs = np.asarray(limits, dtype=float)
+        if theirs.shape != (len(self), 2):
+            raise InputError(
+                f"arm {self.name}: joint limits of shape {theirs.shape}, expected ({len(self)}, 2)",
+                code=Code.WRONG_SHAPE,
+            )
+        lower = np.maximum(self.limits[:, 0], theirs[:, 0])
+        upper = np.minimum(self.limits[:, 1], theirs[:, 1])
+        for name, low, high, other in zip(self.joint_names, lower, upper, theirs, strict=True):
+            if not low < high:
+                raise InputError(
+                    f"arm {self.name}: no position of joint {name} is within its own limits and within "
+                    f"{other[0]:.4g} to {other[1]:.4g}",
+                    code=Code.UNUSABLE_ARM,
+                )
+        return replace(
+            self,
+            joints=tuple(
+                replace(joint, lower=float(low), upper=float(high))
+                for joint, low, high in zip(self.joints, lower, upper, strict=True)
+            ),
+        )
+
     def with_flange(self, T_flange_tool: Pose, name: str = "tool") -> "Arm":
         """Return the arm with another frame at its end, `T_flange_tool` away from the flange of this one."""
         return replace(self, T_last_flange=self.T_last_flange @ T_flange_tool, flange=name)

@@ -55,7 +55,9 @@ class Robot(Protocol):
     Every method raises `handeye.errors.DeviceError` where it fails; `code="motion_refused"` says that the
     robot is well but will not go there. A driver may be asked from another thread than the one that made it,
     never from two at once, except for `stop`. A method `close`, where there is one, is called once, at the
-    end of a session and after `stop`; nothing is asked of the driver then.
+    end of a session and after `stop`; nothing is asked of the driver then. An attribute `joint_limits`, where
+    there is one, holds the lowest and highest position of each joint (radians, metres) that the robot takes:
+    nothing is planned beyond them, nor beyond those of the description.
     """
 
     def move_to(self, goal: Goal) -> None:

@@ -24,6 +24,24 @@ LIMIT_TOLERANCE = 1e-3
 BAD_READING = Code.BAD_READING
 
 
+def limited_arm(arm: Arm, stated: object) -> Arm:
+    """Return an arm within what its driver states as `joint_limits` too; None where it states nothing.
+
+    Raises
+    ------
+    DeviceError
+        They are not two numbers for each joint of the description, or leave a joint no way.
+    """
+    if stated is None:
+        return arm
+    try:
+        return arm.limited(np.array(stated, dtype=float))
+    except InputError as error:
+        raise _bad(f"joint_limits: {error.message}") from error
+    except Exception as error:
+        raise _bad(f"joint_limits: unreadable ({type(error).__name__})") from error
+
+
 def typed_reading(answer: object) -> Reading:
     """Return what a driver answered, its joints as plain numbers.
 

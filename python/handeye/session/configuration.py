@@ -21,7 +21,14 @@ from handeye.robots.shapes import read_shapes
 from handeye.session.attempt import Cell, Eye
 from handeye.session.calls import Calls
 from handeye.session.closing import close, close_all
-from handeye.session.drivers import REPLAY, Person, open_camera, open_robot, replayed_camera
+from handeye.session.drivers import (
+    REPLAY,
+    Person,
+    limited,
+    open_camera,
+    open_robot,
+    replayed_camera,
+)
 from handeye.session.entry import Entry, views_of
 from handeye.session.loop import Session
 from handeye.session.observer import Observer
@@ -93,6 +100,7 @@ def prepare(
             configuration.driver, person, arm, joints_told=None if start is None else start.posture_known
         )
         failed.callback(close, robot_calls, robot)
+        arm = limited(arm, robot, robot_calls, configuration.timeouts.read_s)
         source = open_camera(configuration.images, robot, person, configuration.timeouts.grab_s)
         failed.callback(close, camera_calls, source)
         if camera is None:

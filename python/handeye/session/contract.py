@@ -17,7 +17,7 @@ from handeye.codes import Code
 from handeye.errors import DeviceError
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Reading, Robot
-from handeye.robots.reading import checked_reading, typed_reading
+from handeye.robots.reading import LIMIT_TOLERANCE, checked_reading, typed_reading
 from handeye.robots.replay import is_near
 from handeye.session.attempt import Cell
 from handeye.session.calls import Calls
@@ -163,6 +163,24 @@ def stop_in_motion(robot: Robot, goals: Sequence[Goal]) -> list[str]:
     if not is_near(first.T_base_flange, second.T_base_flange, REST_M, REST_RAD):
         wrong.append("stop in motion: the arm still moves")
     return wrong + arrival(robot, goals[1])
+
+
+def limits_stated(robot: Robot) -> list[str]:
+    """Compare the limits of its joints, where it states them, with where it stands."""
+    limits: object = getattr(robot, "joint_limits", None)
+    reading = read(robot)
+    joints = None if reading is None else reading.joints_rad
+    if limits is None or joints is None:
+        return []
+    try:
+        low, high = np.array(limits, dtype=float).reshape(len(joints), 2).T
+    except (TypeError, ValueError) as error:
+        return [f"joint_limits: {error}; expected the lowest and highest position of {len(joints)} joints"]
+    if not np.all(low < high):
+        return ["joint_limits: the lowest position of a joint is not below the highest"]
+    if not np.all((low - LIMIT_TOLERANCE <= joints) & (joints <= high + LIMIT_TOLERANCE)):
+        return ["joint_limits: the arm stands beyond them; radians, and in this order?"]
+    return []
 
 
 def closed_twice(driver: object) -> list[str]:

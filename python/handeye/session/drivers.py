@@ -25,8 +25,9 @@ from handeye.notations import notation_of, unit_of
 from handeye.robots import Arm
 from handeye.robots.manual import ManualRobot
 from handeye.robots.protocol import Robot
+from handeye.robots.reading import limited_arm
 from handeye.robots.replay import ReplayRobot
-from handeye.session.calls import in_our_words
+from handeye.session.calls import Calls, in_our_words
 from handeye.types import View
 
 REPLAY, MANUAL = "replay", "manual"
@@ -70,6 +71,17 @@ def open_robot(
     if name == REPLAY:
         return ReplayRobot(open_folder(address).recording.views)
     return _announced(ROBOT_GROUP, name, address, ROBOTS, Robot)
+
+
+def limited(arm: Arm, robot: Robot, calls: Calls, patience_s: float) -> Arm:
+    """Return the arm within the limits that its driver states too, once for whatever is planned or checked.
+
+    Raises
+    ------
+    DeviceError
+        They cannot be read, or cannot be those of the arm.
+    """
+    return limited_arm(arm, calls.run(patience_s, getattr, robot, "joint_limits", None))
 
 
 def open_camera(spec: str, robot: Robot, person: Person, patience_s: float = 600.0) -> ImageSource:

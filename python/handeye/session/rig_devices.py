@@ -58,6 +58,7 @@ def prepare_rig(
         told = None if start is None else start.posture_known
         robot = open_robot(configuration.driver, person, arm, joints_told=told)
         failed.callback(close, robot_calls, robot)
+        arm = limited(arm, robot, robot_calls, configuration.timeouts.read_s)
         sources: dict[str, ImageSource] = {}
         for name, spec in images.items():
             sources[name] = open_camera(spec, robot, person, configuration.timeouts.grab_s)

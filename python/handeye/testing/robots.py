@@ -15,6 +15,7 @@ from handeye.session.contract import (
     arrival,
     closed_twice,
     interrupted,
+    limits_stated,
     read,
     refusal,
     slowed,
@@ -89,6 +90,12 @@ class RobotTests:
         assert arrival(robot, goals[0]) == []
         assert refusal(robot, unreachable) == []
         assert arrival(robot, goals[1]) == []
+
+    def test_stands_within_the_limits_that_it_states(self, robot: Robot, goals: Sequence[Goal]) -> None:
+        """Two numbers for each joint, in radians, where it has `joint_limits`."""
+        for goal in goals[:2]:
+            assert arrival(robot, goal) == []
+            assert limits_stated(robot) == []
 
     def test_stops_at_rest(self, robot: Robot) -> None:
         """From any thread, and twice."""

@@ -143,6 +143,21 @@ def test_files_that_are_no_calibration_are_refused(files: str, text: str) -> Non
         LeRobotArm(f"/dev/null,{files}")
 
 
+def test_its_limits_are_those_that_were_calibrated(robot: LeRobotArm) -> None:
+    limits = np.array(robot.joint_limits)
+    assert limits[2] == pytest.approx(np.array([700 - 2050, 3400 - 2050]) * STEP_RAD)
+    for joint, side in np.ndindex(limits.shape):
+        there = POSTURES[0].copy()
+        there[joint] = limits[joint, side]
+        outward = STEP_RAD * (1 if side else -1)
+        far = there + np.where(np.arange(5) == joint, outward, 0.0)
+        with pytest.raises(DeviceError, match="calibrated from"):
+            robot.move_to(Goal("far.1", Pose.identity(), tuple(far.tolist())))
+        # The description is narrower here.
+        with pytest.raises(DeviceError, match="beyond the joint limits"):
+            robot.move_to(Goal("near.1", Pose.identity(), tuple(there.tolist())))
+
+
 def test_a_port_that_is_not_there_is_named(files: str) -> None:
     with pytest.raises(DeviceError, match="/dev/ttyNONE") as caught:
         LeRobotArm(f"/dev/ttyNONE,{files}")

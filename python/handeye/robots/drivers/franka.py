@@ -51,6 +51,11 @@ class FrankaRobot:
         self._lock = threading.Lock()
         _ = self._arm
 
+    @property
+    def joint_limits(self) -> tuple[tuple[float, float], ...]:
+        """Lowest and highest position of each joint of an FR3, radians."""
+        return LIMITS_RAD
+
     @staticmethod
     def found() -> list[tuple[str, str]]:
         """Return nothing: arms are reached by their address.

@@ -95,6 +95,11 @@ class LeRobotArm:
         for servo in self._servos:
             self._bus.read(servo.number, *PRESENT_POSITION)
 
+    @property
+    def joint_limits(self) -> tuple[tuple[float, float], ...]:
+        """Lowest and highest position of each joint that was calibrated, radians."""
+        return tuple(((s.low - s.zero) * STEP_RAD, (s.high - s.zero) * STEP_RAD) for s in self._servos)
+
     @staticmethod
     def found() -> list[tuple[str, str]]:
         """Return the serial ports, behind which an arm may be.

@@ -97,6 +97,11 @@ class Ros2Robot:
             self.close()
             raise
 
+    @property
+    def joint_limits(self) -> FloatArray:
+        """(n, 2) limits of the joints in the description that ROS 2 publishes, radians or metres."""
+        return self._arm.limits
+
     @staticmethod
     def found() -> list[tuple[str, str]]:
         """Return the names of actions that follow trajectories.
