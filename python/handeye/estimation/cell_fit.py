@@ -11,6 +11,7 @@ from typing import NotRequired, TypedDict
 import numpy as np
 
 from handeye import _core
+from handeye.errors import InputError, SolveError
 from handeye.estimation.arm import ArmModel, behind, velocities
 from handeye.estimation.camera_prior import CameraPrior, camera_prior
 from handeye.estimation.measurements import Measurements, ViewPose
@@ -115,12 +116,21 @@ class CellFit:
 
     @cached_property
     def cameras(self) -> dict[str, Camera]:
-        """The cameras as found."""
+        """The cameras as found.
+
+        Raises
+        ------
+        SolveError
+            One is no camera any more: no error of the lens is as large as the views contradict one another.
+        """
         found: dict[str, Camera] = {}
         for name, prior in self.priors.items():
             parameters = np.array(prior.camera.parameters)
             parameters[list(prior.free)] += self.theta[self.rows_of_camera(name)]
-            found[name] = Camera(prior.camera.lens, parameters, *prior.camera.size_px)
+            try:
+                found[name] = Camera(prior.camera.lens, parameters, *prior.camera.size_px)
+            except InputError as error:
+                raise SolveError(f"the views contradict one another: {error.message}") from error
         return found
 
     @cached_property

@@ -3,6 +3,7 @@
 Every goal lies within the limits of the joints and can be reached on a free straight path in joint space.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -90,9 +91,14 @@ class ArmChooser:
         last = situation.to_repeat(self._wish.tries_at_a_place)
         if last is not None:
             goal = self._goal(situation, last.goal, last.goal_joints)
-            return Step(goal, "retry", {"after": last.number}, estimate)
+            return Step(goal, "retry", {"after": last.number}, None if situation.doubtful else estimate)
         if estimate is None:
             return self._starting(situation)
+        if situation.doubtful:
+            # What is seen around the start is judged by no belief, and tells which of the views are wrong.
+            step = self._starting(replace(situation, estimate=None))
+            if isinstance(step, Step):
+                return step
         if missed and missed[-1].failure is Failure.NOT_FOUND and missed[-1].phase == "plan":
             nudge = self._nudge(missed[-1], situation, estimate)
             if nudge is not None:

@@ -134,6 +134,8 @@ class Situation(Attempts):
         Those of them to plan from: views that turned out wrong are left out.
     estimate
         What is believed; None after fewer than three views.
+    doubtful
+        Whether the views contradict one another so that nobody can say yet which of them is wrong.
 
     Examples
     --------
@@ -144,6 +146,7 @@ class Situation(Attempts):
     views: tuple[View, ...]
     measurements: Measurements
     estimate: Estimate | None
+    doubtful: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,10 +94,10 @@ class Session(Stepping[Situation, End]):
 
     def _situation(self) -> Situation | Halt:
         views = self._usable()
-        measurements, estimate = self._planned_from(views)
+        measurements, estimate, doubtful = self._planned_from(views)
         if len(measurements) < len(views) and len(views) >= self._wish.most_views:
             return Halt(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
-        return Situation(self._entries(), tuple(views), measurements, estimate)
+        return Situation(self._entries(), tuple(views), measurements, estimate, doubtful=doubtful)
 
     @property
     def views(self) -> tuple[View, ...]:
@@ -159,23 +159,27 @@ class Session(Stepping[Situation, End]):
         self._measurements = self._measurements.with_views(view for view in views if view.name not in known)
         return self._measurements
 
-    def _planned_from(self, views: list[View]) -> tuple[Measurements, Estimate | None]:
-        """Return what to plan from: one wrong view would make all the others look uncertain.
+    def _planned_from(self, views: list[View]) -> tuple[Measurements, Estimate | None, bool]:
+        """Return what to plan from, what it says, and whether that is in doubt.
 
-        Mistakes are looked for only where a view stands out: where all agree there are none to be found, and
-        the end of the session looks for them in any case.
+        One wrong view would make all the others look uncertain, or draw the answer to where no right view is
+        believed any more. Mistakes are looked for only where a view stands out: where all agree there are none
+        to be found, and the end of the session looks for them in any case.
         """
         measurements = self._with(views)
         if len(measurements) < START_VIEWS:
-            return measurements, None
+            return measurements, None, False
         estimate = self._estimated(measurements)
-        if estimate is None or len(measurements) < FEWEST_EXAMINED or all_agree(measurements, estimate):
-            return measurements, estimate
+        if estimate is not None and all_agree(measurements, estimate):
+            return measurements, estimate, False
         try:
-            measurements = self._examined(measurements).measurements
+            examined = self._examined(measurements).measurements
         except InputError:
-            return measurements, estimate  # Shared by all of them; said at the end.
-        return measurements, self._estimated(measurements) if len(measurements) >= START_VIEWS else None
+            # More views tell which of them are wrong, or that all share a mistake, as the end will say.
+            return measurements, estimate, True
+        if len(measurements) < FEWEST_EXAMINED:
+            return measurements, estimate, len(examined) < len(measurements)
+        return examined, self._estimated(examined) if len(examined) >= START_VIEWS else None, False
 
     def _estimated(self, measurements: Measurements) -> Estimate | None:
         """Return what the views say; None where their numbers fail, and further views tell more."""
