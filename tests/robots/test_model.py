@@ -148,7 +148,11 @@ def test_an_arm_can_be_limited_further() -> None:
     found, reached = narrow.inverse_all(arm.forward(np.random.default_rng(0).uniform(-2, 2, (50, 6))))
     assert 0 < reached.sum() < 50
     assert all(narrow.within_limits(q) for q in found[reached])
-    for wrong, words in ((arm.limits[:5], "shape"), (arm.limits + 20, "joint"), (arm.limits * np.nan, "joint")):
+    for wrong, words in (
+        (arm.limits[:5], "shape"),
+        (arm.limits + 20, "joint"),
+        (arm.limits * np.nan, "joint"),
+    ):
         with pytest.raises(InputError, match=words):
             arm.limited(wrong)
 

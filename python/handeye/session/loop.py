@@ -163,8 +163,8 @@ class Session(Stepping[Situation, End]):
         """Return what to plan from, what it says, and whether that is in doubt.
 
         One wrong view would make all the others look uncertain, or draw the answer to where no right view is
-        believed any more. Mistakes are looked for only where a view stands out: where all agree there are none
-        to be found, and the end of the session looks for them in any case.
+        believed any more. Mistakes are looked for only where a view stands out: where all agree there are
+        none to be found, and the end of the session looks for them in any case.
         """
         measurements = self._with(views)
         if len(measurements) < START_VIEWS:
@@ -177,8 +177,8 @@ class Session(Stepping[Situation, End]):
         except InputError:
             # More views tell which of them are wrong, or that all share a mistake, as the end will say.
             return measurements, estimate, True
-        if len(measurements) < FEWEST_EXAMINED:
-            return measurements, estimate, len(examined) < len(measurements)
+        if len(examined) < len(measurements) < FEWEST_EXAMINED:
+            return measurements, estimate, True
         return examined, self._estimated(examined) if len(examined) >= START_VIEWS else None, False
 
     def _estimated(self, measurements: Measurements) -> Estimate | None:
