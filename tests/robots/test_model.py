@@ -143,7 +143,8 @@ def test_an_arm_can_be_limited_further() -> None:
     narrow = arm.limited(theirs)
     assert np.array_equal(narrow.limits, np.where(np.arange(6)[:, None] == 2, [[-0.5, 0.4]], arm.limits))
     assert np.array_equal(narrow.forward(np.ones(6)), arm.forward(np.ones(6)))
-    assert narrow.limited(arm.limits).fingerprint == narrow.fingerprint != arm.fingerprint
+    assert narrow.limited(arm.limits).fingerprint == narrow.fingerprint == arm.fingerprint
+    assert narrow.with_flange(Pose.identity()).fingerprint != arm.fingerprint
     # It plans within them.
     found, reached = narrow.inverse_all(arm.forward(np.random.default_rng(0).uniform(-2, 2, (50, 6))))
     assert 0 < reached.sum() < 50

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handeye.errors import DeviceError, InputError
+from handeye.errors import DeviceError
 from handeye.robots.protocol import Goal, Reading
 from handeye.session import configuration as configuring
 from handeye.session.attempt import Cell
@@ -77,11 +77,12 @@ def test_no_goal_is_planned_that_the_driver_would_refuse(
     assert len(robot.goals) == 8
     assert not [entry for entry in store.entries if entry.failure is not None]
     store.close()
-    # Going on, it is the same arm, unless the driver states something else.
-    go_on(tmp_path / "s")[1].close()
-    robot.joint_limits = around(0.65)
-    with pytest.raises(InputError, match="limits of its driver"):
-        go_on(tmp_path / "s")
+    # The arm is the one that was described, and what the driver states now is planned with.
+    robot.joint_limits = around(0.55)
+    _, store, again = go_on(tmp_path / "s")
+    store.close()
+    assert again.arm.fingerprint == prepare(configured(0)).arm.fingerprint
+    assert np.array_equal(again.arm.limits[1:], robot.joint_limits[1:])
 
 
 @pytest.mark.parametrize(

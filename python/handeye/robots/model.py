@@ -66,6 +66,8 @@ class Arm:
         The flange in the frame of the last joint.
     base, flange
         Names of the frames at its ends.
+    described
+        Fingerprint of its description, where its limits were narrowed since.
 
     Raises
     ------
@@ -85,6 +87,7 @@ class Arm:
     T_last_flange: Pose = field(default_factory=Pose.identity)
     base: str = "base"
     flange: str = "flange"
+    described: str | None = None
 
     def __post_init__(self) -> None:
         names = self.joint_names
@@ -142,7 +145,12 @@ class Arm:
 
     @property
     def fingerprint(self) -> str:
-        """Checksum of everything that motions follow from: where the joints are, how far and fast they go."""
+        """Checksum of everything that motions follow from: where the joints are, how far and fast they go.
+
+        Of an arm that was `limited`, that of its description.
+        """
+        if self.described is not None:
+            return self.described
         digest = hashlib.blake2b(digest_size=16)
         for joint in self.joints:
             digest.update(repr((joint.name, joint.axis, joint.sliding)).encode())
@@ -191,11 +199,12 @@ class Arm:
                 replace(joint, lower=float(low), upper=float(high))
                 for joint, low, high in zip(self.joints, lower, upper, strict=True)
             ),
+            described=self.fingerprint,
         )
 
     def with_flange(self, T_flange_tool: Pose, name: str = "tool") -> "Arm":
         """Return the arm with another frame at its end, `T_flange_tool` away from the flange of this one."""
-        return replace(self, T_last_flange=self.T_last_flange @ T_flange_tool, flange=name)
+        return replace(self, T_last_flange=self.T_last_flange @ T_flange_tool, flange=name, described=None)
 
     def forward(self, joints: ArrayLike) -> FloatArray:
         """(..., 4, 4) `T_base_flange` at joint positions (..., n).

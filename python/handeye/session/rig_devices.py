@@ -13,7 +13,7 @@ from handeye.session.attempt import Eye
 from handeye.session.calls import Calls
 from handeye.session.closing import close
 from handeye.session.configuration import described, nobody, real_cell, standing
-from handeye.session.drivers import Person, open_camera, open_robot
+from handeye.session.drivers import Person, limited, open_camera, open_robot
 from handeye.session.observer import Observer
 from handeye.session.rig_prepared import RigPrepared
 from handeye.session.settings import Configuration, RigSettings
