@@ -48,13 +48,12 @@ def without_edge_shift(
     # Where corners go as the one and the other edge move outwards by one pixel times their shares.
     moves = -np.stack([second, first], axis=1) / np.maximum(sine, 1e-3)[:, np.newaxis, np.newaxis]
     outwards = np.asarray(np.einsum("nsk,nsi->kni", shares, moves), dtype=np.float64)
-    here = off_plane(plane, pixels)
-    there = [off_plane(plane, pixels - move) for move in outwards]
-    if here is None or any(each is None for each in there):
+    here = off_plane(plane, pixels, np.concatenate(outwards, axis=1))
+    if here is None:
         return pixels
     # What the shifts change and no view of a flat board does.
-    off, freedom = here
-    changes = np.stack([(off - each[0]).ravel() for each in there if each is not None], axis=1)
+    off, freedom, left_of_moves = here
+    changes = left_of_moves.reshape(len(plane), -1, 2).transpose(0, 2, 1).reshape(off.size, -1)
     chosen = np.arange(len(outwards))
     while len(chosen):
         part = changes[:, chosen]

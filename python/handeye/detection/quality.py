@@ -13,9 +13,9 @@ from handeye.detection.part import mapped
 from handeye.types import Target
 from handeye.types.arrays import FloatArray
 
-# Numbers of a homography; a lens adds polynomials in the image of a degree, from so many points for each of
-# their terms: those of its distortion.
-OF_HOMOGRAPHY, DEGREES, POINTS_PER_TERM = 8, (5, 4, 3), 1.7
+# Numbers of a homography; a lens adds polynomials in the image, those of its distortion, of a degree that so
+# many points tell.
+OF_HOMOGRAPHY, POINTS_OF_DEGREE = 8, {5: 36, 4: 26, 3: 16}
 # What is usual counts as one measurement.
 USUAL_COUNT = 1.0
 # No point is better.
@@ -27,27 +27,30 @@ TRIMMED, OF_VARIANCE = 0.03, 0.831
 ASTRAY = 18.4
 
 
-def off_plane(plane: FloatArray, pixels: FloatArray) -> tuple[FloatArray, int] | None:
+def off_plane(
+    plane: FloatArray, pixels: FloatArray, moves: FloatArray | None = None
+) -> tuple[FloatArray, int, FloatArray] | None:
     """Return by how much (N, 2) points in an image are off those of a flat board seen through a lens.
 
-    Also how many of their coordinates such a view leaves free; None where there is no such view.
+    Also how many of their coordinates such a view leaves free, and what of some moves (N, K) of the points,
+    each of one coordinate, no view of a flat board makes; None where there is no such view.
     """
     # OpenCV gives None where it finds none, whatever its types say.
     found, _ = cv2.findHomography(plane, pixels, 0)
     if found is None:  # pyright: ignore[reportUnnecessaryComparison]
         return None
     off = pixels - mapped(np.asarray(found, dtype=np.float64), plane)
-    for degree in DEGREES:
-        powers = [(i, k) for i in range(degree + 1) for k in range(degree + 1 - i)]
-        if len(plane) >= POINTS_PER_TERM * len(powers):
+    off = off if moves is None else np.concatenate([off, moves], axis=1)
+    for degree, fewest in POINTS_OF_DEGREE.items():
+        if len(plane) >= fewest:
+            powers = [(i, k) for i in range(degree + 1) for k in range(degree + 1 - i)]
             low, high = pixels.min(axis=0), pixels.max(axis=0)
             x, y = ((2 * pixels - low - high) / np.maximum(high - low, 1e-12)).T
             columns = np.stack([x**i * y**k for i, k in powers], axis=1)
             # What another homography would change is in the polynomials, too.
-            return off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0], 2 * (
-                len(plane) - len(powers)
-            )
-    return off, 2 * len(plane) - OF_HOMOGRAPHY
+            left = off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0]
+            return left[:, :2], 2 * (len(plane) - len(powers)), left[:, 2:]
+    return off[:, :2], 2 * len(plane) - OF_HOMOGRAPHY, off[:, 2:]
 
 
 def scaled(target: Target, detection: Detection) -> Detection:
@@ -64,7 +67,7 @@ def scaled(target: Target, detection: Detection) -> Detection:
     off = off_plane(target.points[detection.point_ids[told], :2], detection.pixels[told])
     variances = relative**2
     if off is not None and off[1] > 0:
-        residuals, freedom = off
+        residuals, freedom, _ = off
         sorted_squares = np.sort(((residuals / relative[told, np.newaxis]) ** 2).ravel())
         kept = sorted_squares[: round((1 - TRIMMED) * len(sorted_squares))]
         variance = float(kept.mean()) / OF_VARIANCE * residuals.size / freedom
