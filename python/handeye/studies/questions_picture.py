@@ -50,4 +50,4 @@ def _beside_each_other(axis: Axes, choices: Sequence[Mapping[str, Any]], key: st
         axis.plot(at, [level[key] for level in levels], mark, color=colour, markersize=6, label=label)
     axis.set_xticks(range(len(names)), names, rotation=25, ha="right")
     axis.set_xlim(-0.5, len(names) - 0.5)
-    axis.legend(fontsize=8, frameon=False)
+    axis.legend(fontsize=8, edgecolor="0.8")
