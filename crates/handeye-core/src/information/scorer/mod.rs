@@ -15,6 +15,8 @@ mod forms;
 mod pinhole;
 mod target;
 #[cfg(test)]
+mod test_scene;
+#[cfg(test)]
 mod tests;
 mod wide_algebra;
 mod wide_points;
