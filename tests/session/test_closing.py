@@ -13,6 +13,7 @@ from handeye.cameras.protocol import Frame
 from handeye.errors import DeviceError, InputError
 from handeye.robots.protocol import Goal, Reading
 from handeye.session import configuration as configuring
+from handeye.session import opening
 from handeye.session.attempt import Cell
 from handeye.session.closing import HURRIED_S, close_all, closing
 from handeye.session.configuration import begin, go_on, prepare
@@ -142,7 +143,7 @@ def test_a_motion_that_is_interrupted_has_come_back_before_its_driver_is_closed(
 def real(monkeypatch: pytest.MonkeyPatch) -> tuple[Configuration, Cell, Noted, NotedCamera, list[str]]:
     """A run whose drivers are not simulated, as far as it can tell."""
     cell, robot, camera, called = noted()
-    monkeypatch.setattr(configuring, "open_robot", lambda *_, **__: robot)
+    monkeypatch.setattr(opening, "open_robot", lambda *_, **__: robot)
     monkeypatch.setattr(configuring, "open_camera", lambda *_, **__: camera)
     assert cell.workspace is not None
     low, high = cell.workspace.lower_m, cell.workspace.upper_m

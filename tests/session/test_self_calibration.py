@@ -15,6 +15,7 @@ from handeye.estimation.lens_confidence import lens_difference_px
 from handeye.planning import Stop
 from handeye.planning.stopping import State
 from handeye.session import configuration as configurations
+from handeye.session import opening
 from handeye.session.configuration import Configuration, begin, go_on, prepare
 from handeye.session.deciding import EndReason, Step
 from handeye.session.request import Requested
@@ -158,7 +159,7 @@ def test_a_real_camera_is_asked_for_one_picture(monkeypatch: pytest.MonkeyPatch,
             asked.append(label)
             return answer[0]
 
-    monkeypatch.setattr(configurations, "open_robot", lambda *_, **__: made.cell.robot)
+    monkeypatch.setattr(opening, "open_robot", lambda *_, **__: made.cell.robot)
     monkeypatch.setattr(configurations, "open_camera", lambda *_, **__: Watched())
     real = replace(
         configured(0), driver="mine", images="mine", workspace_m=((-1.0, -1.0, 0.0), (1.0, 1.0, 1.5))
@@ -192,7 +193,7 @@ def test_decisions_go_on_from_what_was_known_at_the_beginning(
         def grab(self, label: str) -> Frame:
             return (pictured if label == "size_of_image" else made).cell.source.grab(label)
 
-    monkeypatch.setattr(configurations, "open_robot", lambda *_, **__: made.cell.robot)
+    monkeypatch.setattr(opening, "open_robot", lambda *_, **__: made.cell.robot)
     monkeypatch.setattr(configurations, "open_camera", lambda *_, **__: Watched())
     space = ((-1.0, -1.0, 0.0), (1.0, 1.0, 1.5))
     real = replace(configured(0), driver="mine", images="mine", workspace_m=space)

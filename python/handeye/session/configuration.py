@@ -5,8 +5,6 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from handeye.cameras.protocol import ImageSource, checked_frame
 from handeye.cameras.render import Appearance
 from handeye.cameras.simulated import Optics
@@ -14,29 +12,20 @@ from handeye.codes import Code
 from handeye.errors import DeviceError, InputError
 from handeye.importing import SourceOptions, open_folder
 from handeye.planning.solids import SolidLinks
-from handeye.robots import Arm, open_arm, shipped_arms
-from handeye.robots.protocol import Goal, Robot
+from handeye.robots import Arm, open_arm
+from handeye.robots.protocol import Goal
 from handeye.robots.replay import ReplayRobot
-from handeye.robots.shapes import read_shapes
 from handeye.session.attempt import Cell, Eye
 from handeye.session.calls import Calls
 from handeye.session.closing import close, close_all
-from handeye.session.drivers import (
-    REPLAY,
-    Person,
-    limited,
-    open_camera,
-    open_robot,
-    replayed_camera,
-)
+from handeye.session.drivers import REPLAY, Person, open_camera, replayed_camera
 from handeye.session.entry import Entry, views_of
 from handeye.session.loop import Session
 from handeye.session.observer import Observer
+from handeye.session.opening import NOBODY, described, opened_robot, real_cell, safe, standing
 from handeye.session.prepared import Prepared
-from handeye.session.safety import body_of
 from handeye.session.self_calibration import SelfCalibration, nominal_camera
 from handeye.session.settings import (
-    Collisions,
     Configuration,
     check_fingerprints,
     fingerprints,
@@ -93,14 +82,10 @@ def prepare(
             "a real cell needs a target", code=Code.MISSING_VALUE, hint="name its file with --target"
         )
     configuration.workspace()  # must be stated
-    person = person or Person(nobody, lambda _: None)
+    person = person or NOBODY
     robot_calls, camera_calls = Calls("robot"), Calls("camera")
     with ExitStack() as failed:
-        robot = open_robot(
-            configuration.driver, person, arm, joints_told=None if start is None else start.posture_known
-        )
-        failed.callback(close, robot_calls, robot)
-        arm = limited(arm, robot, robot_calls, configuration.timeouts.read_s)
+        arm, robot = opened_robot(configuration, arm, person, robot_calls, start, failed)
         source = open_camera(configuration.images, robot, person, configuration.timeouts.grab_s)
         failed.callback(close, camera_calls, source)
         if camera is None:
@@ -116,56 +101,6 @@ def prepare(
         failed.pop_all()
     recording = Recording(f"session with {arm.name}", configuration.mounting, camera, target, ())
     return Prepared(configuration, cell, start, recording)
-
-
-def described(configuration: Configuration) -> tuple[Arm, SolidLinks | None, Configuration]:
-    """Return the arm, the shapes of its links where they are known, and what is then judged by.
-
-    Raises
-    ------
-    InputError
-        No arm is named, or its description cannot be read.
-    """
-    if configuration.robot is None:
-        raise InputError(
-            "no arm is named",
-            code=Code.MISSING_VALUE,
-            hint=f"name it with --robot: {', '.join(shipped_arms())}, or its URDF or MJCF file",
-        )
-    arm = open_arm(configuration.robot)
-    solids = _solids(configuration, arm)
-    by = Collisions.CAPSULES if solids is None else Collisions.MESHES
-    return arm, solids, replace(configuration, collisions=by)
-
-
-def real_cell(
-    configuration: Configuration,
-    arm: Arm,
-    solids: SolidLinks | None,
-    robot: Robot,
-    eye: Eye,
-    confirm: Callable[[Goal], bool] | None,
-) -> Cell:
-    """Return the cell of drivers that are open, with one camera and target.
-
-    Raises
-    ------
-    InputError
-        No workspace is stated.
-    """
-    return Cell(
-        robot,
-        eye.source,
-        arm,
-        configuration.workspace(),
-        eye.camera,
-        eye.target,
-        configuration.timeouts,
-        confirm,
-        solids,
-        configuration.speed_rad_s,
-        by_hand=configuration.by_hand,
-    )
 
 
 def begin(prepared: Prepared, folder: Any) -> tuple[Session, SessionStore]:  # noqa: ANN401
@@ -240,53 +175,6 @@ def left_at(entries: Sequence[Entry]) -> tuple[float, ...] | None:
     return None
 
 
-def standing(cell: Cell, arm: Arm) -> Start:
-    """Return where the arm stands, if that is a place from which it may go.
-
-    Raises
-    ------
-    DeviceError
-        The robot does not say, or what it says cannot be true.
-    InputError
-        It stands where no motion may go.
-    SolveError
-        Nobody tells the joints, and the description does not reach the pose.
-    """
-    reading = cell.read()
-    if reading.joints_rad is None:
-        joints = arm.inverse(reading.T_base_flange)
-        return _safe(Start(reading.T_base_flange, tuple(joints.tolist()), posture_known=False), cell)
-    low, high = arm.limits.T
-    # At a limit encoders may read a little beyond it.
-    joints = np.clip(reading.joints_rad, low, high)
-    return _safe(Start(reading.T_base_flange, tuple(joints.tolist())), cell)
-
-
-def _safe(start: Start, cell: Cell) -> Start:
-    """Return a start if it may be a goal too.
-
-    Raises
-    ------
-    InputError
-        It may not.
-    """
-    if cell.arm is None or cell.workspace is None:
-        return start
-    if start.posture_known:
-        body = body_of(cell.arm, cell.workspace, cell.solids, None)
-        why = body.obstacles(np.array(start.joints_rad)[np.newaxis])[0]
-    else:
-        inside = cell.workspace.contains(start.T_base_flange.translation)
-        why = None if inside else "flange or tool would leave the workspace"
-    if why is not None:
-        raise InputError(
-            f"the arm stands where it may not go: {why}",
-            code=Code.UNSAFE_START,
-            hint="drive it to a free place, or state a workspace and a floor that are true",
-        )
-    return start
-
-
 def _replayed(
     configuration: Configuration,
     camera: Camera | None,
@@ -316,29 +204,6 @@ def _replayed(
     )
     configuration = replace(configuration, mounting=source.mounting, camera_known=True)
     return Prepared(configuration, cell, None, recording, source.truth, recorded=source.views)
-
-
-def _solids(configuration: Configuration, arm: Arm) -> SolidLinks | None:
-    """Return the shapes of the links as far as they are wanted and known.
-
-    Raises
-    ------
-    InputError
-        They are asked for and cannot be had.
-    """
-    wanted = Collisions(configuration.collisions)
-    if configuration.robot is None or wanted is Collisions.CAPSULES:
-        return None
-    try:
-        if configuration.robot in shipped_arms():
-            raise InputError(
-                f"{configuration.robot}: the shipped description has no shapes", code=Code.NO_SHAPES
-            )
-        return SolidLinks(arm, read_shapes(configuration.robot, arm))
-    except InputError:
-        if wanted is Collisions.MESHES:
-            raise
-        return None
 
 
 def _simulated(
@@ -381,7 +246,7 @@ def _simulated(
     if not configuration.camera_known:
         nominal = nominal_camera(cell.camera.size_px, configuration.lens)
         cell, recording = replace(cell, camera=nominal), replace(recording, camera=nominal)
-    start = _safe(made.start, cell)
+    start = safe(made.start, cell)
     return Prepared(
         configuration, cell, start, recording, made.truth, made.hidden_arm, true_camera=made.true_camera
     )
@@ -404,14 +269,3 @@ def _pictured_size(source: ImageSource, calls: Calls, patience_s: float) -> tupl
         )
     height, width = frame.image.shape
     return width, height
-
-
-def nobody(question: str) -> str:
-    """Answer nothing: there is no person.
-
-    Raises
-    ------
-    EOFError
-        Always.
-    """
-    raise EOFError(question)

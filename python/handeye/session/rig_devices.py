@@ -12,9 +12,9 @@ from handeye.robots.protocol import Goal
 from handeye.session.attempt import Eye
 from handeye.session.calls import Calls
 from handeye.session.closing import close
-from handeye.session.configuration import described, nobody, real_cell, standing
-from handeye.session.drivers import Person, limited, open_camera, open_robot
+from handeye.session.drivers import Person, open_camera
 from handeye.session.observer import Observer
+from handeye.session.opening import NOBODY, described, opened_robot, real_cell, standing
 from handeye.session.rig_prepared import RigPrepared
 from handeye.session.settings import Configuration, RigSettings
 from handeye.session.starting import Start
@@ -51,14 +51,11 @@ def prepare_rig(
     configuration.wish()  # refused now rather than once the arm has moved
     arm, solids, configuration = described(configuration)
     configuration.workspace()  # must be stated
-    person = person or Person(nobody, lambda _: None)
+    person = person or NOBODY
     robot_calls, camera_calls = Calls("robot"), Calls("camera")
     recording, images = _taking_part(configuration, recording)
     with ExitStack() as failed:
-        told = None if start is None else start.posture_known
-        robot = open_robot(configuration.driver, person, arm, joints_told=told)
-        failed.callback(close, robot_calls, robot)
-        arm = limited(arm, robot, robot_calls, configuration.timeouts.read_s)
+        arm, robot = opened_robot(configuration, arm, person, robot_calls, start, failed)
         sources: dict[str, ImageSource] = {}
         for name, spec in images.items():
             sources[name] = open_camera(spec, robot, person, configuration.timeouts.grab_s)
