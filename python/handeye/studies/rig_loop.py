@@ -21,7 +21,7 @@ from handeye.types import Pose
 from handeye.validation import metrics
 
 # A run of the study ends with so many stations in any case.
-MOST_STATIONS = 30
+MOST_STATIONS = 60
 
 
 @dataclass(frozen=True)
