@@ -9,6 +9,7 @@ import pytest
 from handeye.errors import DeviceError
 from handeye.robots.protocol import Goal, Reading
 from handeye.session import configuration as configuring
+from handeye.session import opening
 from handeye.session.attempt import Cell
 from handeye.session.configuration import begin, go_on, prepare
 from handeye.session.deciding import EndReason
@@ -45,7 +46,7 @@ def narrowed(monkeypatch: pytest.MonkeyPatch, stated: object) -> tuple[Narrow, P
     """Prepare a run on a robot that states limits."""
     made = prepare(configured(0))
     robot = Narrow(made.cell, stated)
-    monkeypatch.setattr(configuring, "open_robot", lambda *_, **__: robot)
+    monkeypatch.setattr(opening, "open_robot", lambda *_, **__: robot)
     monkeypatch.setattr(configuring, "open_camera", lambda *_, **__: made.cell.source)
     space = made.cell.workspace
     assert space is not None
