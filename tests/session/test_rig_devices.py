@@ -14,6 +14,7 @@ from handeye.datasets import read_rig, read_rig_description
 from handeye.datasets.toml_text import toml_text
 from handeye.errors import DeviceError, InputError
 from handeye.robots import Arm
+from handeye.robots.drivers.universal_robots import UniversalRobot
 from handeye.robots.protocol import Goal
 from handeye.session import rig_devices
 from handeye.session.rig_devices import prepare_rig
@@ -214,3 +215,19 @@ def test_what_is_asked_of_a_rig_must_be_there(handeye: Handeye, rig: Rig, tmp_pa
     rig.file.write_text(on_flange)
     assert handeye.fails(*asked)["code"] == "not_tied"
     assert not (tmp_path / "s").exists()
+
+
+def test_a_rig_is_planned_within_the_limits_that_its_driver_states(
+    handeye: Handeye, rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = np.array(rig.prepared.start.joints_rad)
+    monkeypatch.setattr(
+        UniversalRobot, "joint_limits", np.stack([here - 0.7, here + 0.7], axis=1), raising=False
+    )
+    handeye.json(*rig.options(tmp_path / "s"), "--max-views", "7", "--accuracy-mm", "0.01", "--anyway")
+    stations = read_rig(tmp_path / "s").recording.stations
+    assert len(stations) == 7
+    # As the encoders say; those of the arm are off by less than this.
+    assert all(
+        np.abs(np.subtract(station.joints_rad or (9.0,) * 6, here)).max() < 0.71 for station in stations
+    )
