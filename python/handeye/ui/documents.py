@@ -14,6 +14,7 @@ from handeye.detection import Detection
 from handeye.errors import DegenerateError
 from handeye.estimation import Estimate, Measurements
 from handeye.estimation.confidence import ellipsoid
+from handeye.estimation.work import USUAL_TOOL_M
 from handeye.planning.limits import NOTHING, limits
 from handeye.robots import Arm
 from handeye.robots.protocol import Goal, Reading
@@ -301,7 +302,7 @@ def _opening(camera: Camera) -> list[float]:
 
 
 def _ellipsoids(shown: Shown, estimate: Estimate, at: Pose) -> list[dict[str, Any]]:
-    """Return 95 % ellipsoids of the camera's centre, and of a point at the target as the camera sees it."""
+    """Return 95 % ellipsoids of the camera's centre, and of target and tool as the camera has them."""
     if not estimate.determined:
         return []
     A = shown.mounting.chain(at)
@@ -309,11 +310,12 @@ def _ellipsoids(shown: Shown, estimate: Estimate, at: Pose) -> list[dict[str, An
     in_hand = shown.mounting is Mounting.EYE_IN_HAND
     T_base_camera = at @ estimate.X.inverse() if in_hand else estimate.X.inverse()
     aim = T_camera_target.act(shown.target.points.mean(axis=0, keepdims=True))[0]
+    tip = (T_base_camera.inverse() @ at).act(np.array([USUAL_TOOL_M]))[0]
     covariance = estimate.hand_eye_covariance
     apart = np.ptp(_poses(shown.views)[:, :3, 3], axis=0).max() if shown.views else 0.0
     drawn_m = DRAWN * max(float(apart), LEAST_M)
     found: list[dict[str, Any]] = []
-    for name, point in (("camera", np.zeros(3)), ("a point at the target", aim)):
+    for name, point in (("camera", np.zeros(3)), ("a point at the target", aim), ("tool", tip)):
         x, y, z = point
         jacobian = np.hstack([np.eye(3), -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])])
         region = ellipsoid(jacobian @ covariance @ jacobian.T, estimate.degrees_of_freedom)
