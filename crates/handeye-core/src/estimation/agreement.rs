@@ -106,7 +106,7 @@ impl Agreement {
             Some(levels) => return Err(Error::invalid(format!("{} levels", levels.len()))),
             None => set.start(),
         };
-        let mode = find_mode(&set, start, &[])?;
+        let mode = find_mode(&set, start)?;
         let mut nodes = Vec::with_capacity(2 * pairs + 1);
         for (t, density) in nodes::around(&mode.t, &mode.curvature, pairs) {
             // Levels at which the model is singular have no share.

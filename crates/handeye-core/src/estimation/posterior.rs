@@ -109,6 +109,8 @@ const AT_REST: f64 = 1e-2;
 const MOST_STEPS: usize = 30;
 /// A step that lowers the penalised likelihood by less is the last.
 const FLAT: f64 = 1e-3;
+/// The same in the first round of several cameras.
+const ROUGHLY_FLAT: f64 = 0.1;
 /// Longest step of a level, in its logarithm.
 const LONGEST_STEP: f64 = 1.5;
 
@@ -138,7 +140,7 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
     while rounds < options.most_rounds {
         rounds += 1;
         let found = match levels {
-            Some(levels) => find_mode(&mixed, levels, &[])?,
+            Some(levels) => find_mode(&mixed, levels)?,
             None => first_mode(&mixed, options, cell.is_unseen(), bent)?,
         };
         steps += found.steps;
@@ -156,7 +158,7 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
     }
     let found = match mode {
         Some(found) => found,
-        None => find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()), &[])?,
+        None => find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()))?,
     };
     let (nodes, at_mode) = average(&mixed, &found, options.pairs)?;
     let come = (rounds, steps, converged && found.at_rest);
@@ -226,17 +228,24 @@ fn first_mode(mixed: &Mixed, options: &Options, unseen: bool, bent: bool) -> Res
     let of_pictures = mixed.components.iter().filter(|(name, _)| !components::is_of_robot(name));
     let held: Vec<usize> =
         if bent { of_pictures.flat_map(|(_, range)| range.clone()).collect() } else { vec![] };
-    let small = find_mode(mixed, start, &held)?;
+    // Where the chains are linearised anew, the first round need not end exactly.
+    let flat = if mixed.settled.rows > 0 { ROUGHLY_FLAT } else { FLAT };
+    let small = search(mixed, start, &held, flat)?;
     if !unseen {
         return Ok(small);
     }
-    let large = find_mode(mixed, mixed.large_start(), &held)?;
+    let large = search(mixed, mixed.large_start(), &held, flat)?;
     let steps = small.steps + large.steps;
     Ok(Mode { steps, ..if large.value < small.value { large } else { small } })
 }
 
-/// Newton's method on the levels but those that are held, damped until the penalised likelihood falls.
-pub(super) fn find_mode(mixed: &Mixed, start: DVector<f64>, held: &[usize]) -> Result<Mode, Error> {
+/// The mode of the levels, none of them held.
+pub(super) fn find_mode(mixed: &Mixed, start: DVector<f64>) -> Result<Mode, Error> {
+    search(mixed, start, &[], FLAT)
+}
+
+/// Newton's method on the levels but those that are held, damped until the penalised likelihood falls by less than `flat`.
+fn search(mixed: &Mixed, start: DVector<f64>, held: &[usize], flat: f64) -> Result<Mode, Error> {
     let mut t = start;
     let mut now = mixed.evaluate(&t, Wanted::Slope).ok_or_else(singular)?;
     let mut damping = 1e-2;
@@ -249,14 +258,14 @@ pub(super) fn find_mode(mixed: &Mixed, start: DVector<f64>, held: &[usize]) -> R
         for _ in 0..8 {
             let step = damped_step(&now, damping, held);
             let promised = -0.5 * step.dot(&now.slope);
-            if promised < FLAT * 0.1 {
+            if promised < flat * 0.1 {
                 at_rest = true;
                 break;
             }
             let there = &t + &step;
             match mixed.evaluate(&there, Wanted::Slope) {
                 Some(next) if next.value < now.value => {
-                    at_rest = now.value - next.value < FLAT;
+                    at_rest = now.value - next.value < flat;
                     t = there;
                     now = next;
                     damping = (damping * 0.2).max(1e-4);
