@@ -24,6 +24,7 @@ from handeye.planning.rig_request import Aim, Pair, seen_most
 from handeye.planning.visibility import obstacles
 from handeye.types.arrays import FloatArray
 from handeye.types.mounting import Mounting
+from handeye.types.pose import inverses
 from handeye.types.rig import Body
 
 # Candidates whose joint information is computed.
@@ -110,7 +111,7 @@ def rig_gains(
     criterion = _core.Criterion("entropy_handeye")
     in_base = np.array([candidate.T_base_flange.matrix for candidate in pool.candidates]).reshape(-1, 4, 4)
     motions: dict[Mounting, FloatArray] = {
-        Mounting.EYE_IN_HAND: np.asarray(np.linalg.inv(in_base), dtype=np.float64),
+        Mounting.EYE_IN_HAND: inverses(in_base),
         Mounting.EYE_TO_HAND: in_base,
     }
     for pair, one in pairs.items():

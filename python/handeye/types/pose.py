@@ -273,7 +273,12 @@ def _unrounded(matrix: FloatArray) -> FloatArray:
 
 def inverses(poses: FloatArray) -> FloatArray:
     """(..., 4, 4) inverses of rigid transforms (..., 4, 4)."""
-    return np.asarray(np.linalg.inv(poses), dtype=np.float64)
+    turned = np.swapaxes(poses[..., :3, :3], -2, -1)
+    found = np.zeros_like(poses, dtype=np.float64)
+    found[..., :3, :3] = turned
+    found[..., :3, 3] = -(turned @ poses[..., :3, 3:])[..., 0]
+    found[..., 3, 3] = 1.0
+    return found
 
 
 def through_twist(points: FloatArray, in_point: FloatArray) -> FloatArray:
