@@ -47,8 +47,8 @@ def commands(folder: Path) -> dict[str, tuple[str, ...]]:
         "doctor": ("doctor", recording),
         "plan": ("plan", recording),
         "detect": ("detect", str(photos), *board),
-        "import": ("import", str(photos), "--output", new, *board),
-        "import a bag": ("import", bag, "--output", new, *board, "--mounting", "eye_in_hand"),
+        "import": ("import", str(photos), new, *board),
+        "import a bag": ("import", bag, new, "--rows", "6", "--columns", "8", "--pitch-mm", "30"),
         "expect": ("expect", "--robot", "ur5e"),
         "demo": ("demo",),
         "study": ("study", "twin", "--workers", "1"),
@@ -64,7 +64,7 @@ def commands(folder: Path) -> dict[str, tuple[str, ...]]:
         "run, no picture comes": (
             *("run", "--session", new, "--driver", "hostile:ok", "--images", f"folder:{folder}", *stuck),
         ),
-        "page": ("ui", recording, "--no-browser"),
+        "page": ("ui", recording),
         "target": ("target", "charuco", "--rows", "40", "--columns", "30", "--output", f"{new}.pdf"),
         "bench": ("bench", "loop"),
     }
@@ -119,6 +119,7 @@ def main() -> int:
             codes.append(code)
             if seconds >= worst:
                 worst, words = seconds, said
+        # A command line that is refused has not been interrupted.
         wrong = worst > ENOUGH_S or any(code not in {0, ExitCode.INTERRUPTED} for code in codes)
         late += wrong
         print(
