@@ -228,7 +228,7 @@ fn first_mode(mixed: &Mixed, options: &Options, unseen: bool, bent: bool) -> Res
     let of_pictures = mixed.components.iter().filter(|(name, _)| !components::is_of_robot(name));
     let held: Vec<usize> =
         if bent { of_pictures.flat_map(|(_, range)| range.clone()).collect() } else { vec![] };
-    // Where the chains are linearised anew, the first round need not end exactly.
+    // Where the chains are linearised again, the first round need not end exactly.
     let flat = if mixed.settled.rows > 0 { ROUGHLY_FLAT } else { FLAT };
     let small = search(mixed, start, &held, flat)?;
     if !unseen {
