@@ -1,5 +1,7 @@
 """Several cameras are told to expose at once; each frame is given once; a camera that fails is named."""
 
+import subprocess
+import sys
 import threading
 import time
 
@@ -44,7 +46,6 @@ def grey(frame: Frame) -> int:
 def test_all_expose_before_any_is_waited_for(cameras: dict[str, Slow]) -> None:
     rig = SeveralCameras(cameras)
     frames = rig.grab("station_01.1")
-    rig.close()
     assert {name: grey(frame) for name, frame in frames.items()} == {"left": 1, "right": 11, "front": 21}
 
 
@@ -56,7 +57,6 @@ def test_each_eye_gets_its_frame_of_the_stop(cameras: dict[str, Slow]) -> None:
     # Asked again at the same stop: a new exposure, not the old frame.
     assert grey(eyes["left"].grab("station_02.1")) == 3
     assert cameras["left"].labels == ["station_01.1", "station_02.1", "station_02.1"]
-    rig.close()
 
 
 def test_a_stop_that_was_given_up_leaves_nothing_behind(cameras: dict[str, Slow]) -> None:
@@ -75,7 +75,29 @@ def test_a_stop_that_was_given_up_leaves_nothing_behind(cameras: dict[str, Slow]
     assert caught.value.code == "driver_failed"
     cameras["front"].error = None
     assert grey(eyes["left"].grab("station_02.3")) == 5
-    rig.close()
+
+
+HANGS = """
+import threading
+from handeye.cameras.protocol import Frame
+from handeye.cameras.several import SeveralCameras
+
+class Hanging:
+    def grab(self, label):
+        threading.Event().wait()
+
+rig = SeveralCameras({"left": Hanging(), "right": Hanging()})
+threading.Thread(target=rig.grab, args=("station_01.1",), daemon=True).start()
+while sum(thread.name == "camera" for thread in threading.enumerate()) < 2:
+    pass
+print("ends")
+"""
+
+
+def test_the_program_ends_though_a_camera_hangs() -> None:
+    line = [sys.executable, "-c", HANGS]
+    ended = subprocess.run(line, check=False, capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (0, "ends\n"), ended.stderr
 
 
 def test_a_frame_is_given_once_for_each_target_looked_for(cameras: dict[str, Slow]) -> None:
@@ -84,4 +106,3 @@ def test_a_frame_is_given_once_for_each_target_looked_for(cameras: dict[str, Slo
     asked = ["left", "left", "right", "front", "right", "front"]
     assert [grey(eyes[name].grab("station_01.1")) for name in asked] == [1, 1, 11, 21, 11, 21]
     assert grey(eyes["left"].grab("station_01.1")) == 2
-    rig.close()

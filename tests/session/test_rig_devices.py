@@ -183,6 +183,7 @@ def test_a_file_that_describes_no_rig_is_refused(rig: Rig, old: str, new: str, n
     ("one", "other", "refused"),
     [
         (Chessboard(6, 9, 0.025), Chessboard(6, 9, 0.04), True),
+        (Chessboard(6, 9, 0.025), Chessboard(9, 6, 0.04), True),
         (Chessboard(6, 9, 0.025), Chessboard(6, 8, 0.025), False),
         (AprilGrid(4, 4, 0.03, 0.3), AprilGrid(2, 2, 0.03, 0.3, first_id=15), True),
         (AprilGrid(4, 4, 0.03, 0.3), AprilGrid(4, 4, 0.03, 0.3, first_id=16), False),

@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 
 from handeye.cameras.protocol import Frame, ImageSource
 from handeye.codes import Code
@@ -26,8 +26,6 @@ class SeveralCameras:
 
     def __init__(self, sources: Mapping[str, ImageSource]) -> None:
         self._sources = dict(sources)
-        # As many threads as cameras: none waits for another.
-        self._threads = ThreadPoolExecutor(max(len(sources), 1), thread_name_prefix="camera")
 
     def grab(self, label: str) -> dict[str, Frame]:
         """Return the picture of every camera, exposed at this stop.
@@ -54,13 +52,23 @@ class SeveralCameras:
         shared = _Shared(self._exposed, looks or once)
         return {name: _Eye(name, one, shared) for name, one in self._sources.items()}
 
-    def close(self) -> None:
-        """End the threads; the drivers stay open."""
-        self._threads.shutdown(wait=False)
-
     def _exposed(self, label: str) -> dict[str, Frame | DeviceError]:
-        waiting = {name: self._threads.submit(one.grab, label) for name, one in self._sources.items()}
+        waiting = {name: _begun(one, label) for name, one in self._sources.items()}
         return {name: _answer(name, each) for name, each in waiting.items()}
+
+
+def _begun(source: ImageSource, label: str) -> Future[Frame]:
+    """Tell a camera to expose; none waits for another, and the end of the program for none that hangs."""
+    future: Future[Frame] = Future()
+
+    def work() -> None:
+        try:
+            future.set_result(source.grab(label))
+        except BaseException as error:  # noqa: BLE001 - whatever a driver raises
+            future.set_exception(error)
+
+    threading.Thread(target=work, name="camera", daemon=True).start()
+    return future
 
 
 def _answer(name: str, waiting: Future[Frame]) -> Frame | DeviceError:

@@ -156,6 +156,7 @@ def run(
     if images is None:
         # Each camera of a rig has its own.
         images = REPLAY if replays else SIMULATED if several.rig_file is None else "rig"
+    described = several.described()
     configuration = Configuration(
         robot=robot,
         driver=driver,
@@ -185,7 +186,7 @@ def run(
         touch_mm=touch_mm,
         work=work.work(),
         height=height_of(height_mm, model),
-        rig=several.settings(),
+        rig=several.settings(described),
         anyway=anyway,
     )
     _check(configuration, given=given, dry_run=dry_run)
@@ -196,7 +197,6 @@ def run(
         check_new_folder(session)
     front = _Front(page if not dry_run else Page(), configuration, confirm, as_json=common.json)
     if session is not None and configuration.rig is not None:
-        described = several.described()
         rig = cell_of(
             configuration,
             None if described is None else described.recording,

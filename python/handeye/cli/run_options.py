@@ -98,15 +98,13 @@ class Rig:
     camera_to_camera_deg: float | None = None
     """The same for their rotation."""
 
-    def settings(self) -> RigSettings | None:
-        """Return it as the library takes it; None for one camera.
+    def settings(self, described: RigDescription | None) -> RigSettings | None:
+        """Return it as the library takes it, with what the file says; None for one camera.
 
         Raises
         ------
         UsageError
             Options that need others.
-        InputError
-            A file that describes no rig.
         """
         if not (self.rig or self.rig_file):
             if self != Rig():
@@ -117,7 +115,6 @@ class Rig:
         mm, deg = self.camera_to_camera_mm, self.camera_to_camera_deg
         if (mm is None) != (deg is None):
             raise UsageError("--camera-to-camera-mm and --camera-to-camera-deg go together")
-        described = self.described()
         return RigSettings(
             self.cameras,
             None if mm is None or deg is None else (mm, deg),

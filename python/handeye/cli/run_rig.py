@@ -47,7 +47,7 @@ def check_rig(configuration: Configuration, *, given: bool, dry_run: bool) -> No
         It does not.
     """
     real = configuration.rig is not None and configuration.rig.images is not None
-    if real == configuration.is_simulated:
+    if real == configuration.is_simulated or configuration.is_replay:
         raise UsageError(
             "--rig drives a simulated rig, and --rig-file a real one with --robot and --driver",
             hint="describe the cameras and targets of a real rig in a file, see handeye run --help",

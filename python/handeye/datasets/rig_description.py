@@ -17,11 +17,11 @@ Files are named from where this one lies.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from handeye.codes import Code
 from handeye.datasets.camera_files import read_camera
@@ -34,6 +34,8 @@ from handeye.errors import InputError
 from handeye.types import Camera, MountedCamera, MountedTarget, RigRecording, Target
 from handeye.types.plain import Document, read_document
 from handeye.types.target.coded import Coded
+
+T = TypeVar("T")
 
 
 class _Description(Document):
@@ -97,20 +99,10 @@ def read_rig_description(path: str | os.PathLike[str]) -> RigDescription:
     with located(str(file)):
         for name, body, rest in named_tables(document.camera, "camera"):
             images[name] = _text(rest.pop("images", None), f"camera {name}: images", "the name of its driver")
-            calibration = rest.pop("calibration", None)
-            if calibration is None:
-                with located(f"camera {name}"):
-                    camera = Camera.from_dict(rest)
-            else:
-                camera = read_camera(_beside(file, calibration, rest, f"camera {name}: calibration"))
+            camera = _either(file, rest, f"camera {name}", "calibration", (read_camera, Camera.from_dict))
             cameras[name] = MountedCamera(camera, body)
         for name, body, rest in named_tables(document.target, "target"):
-            board = rest.pop("board", None)
-            if board is None:
-                with located(f"target {name}"):
-                    target = Target.from_dict(rest)
-            else:
-                target = read_target(_beside(file, board, rest, f"target {name}: board"))
+            target = _either(file, rest, f"target {name}", "board", (read_target, Target.from_dict))
             targets[name] = MountedTarget(target, body)
         for (a, one), (b, other) in combinations(targets.items(), 2):
             if look_alike(one.target, other.target):
@@ -139,8 +131,9 @@ def look_alike(one: Target, other: Target) -> bool:
 
 
 def _counts(target: Target) -> dict[str, Any]:
-    """Return what a picture shows of a target: all but its sizes."""
-    return {name: value for name, value in target.to_dict().items() if not name.endswith("_m")}
+    """Return what a picture shows of a target, which may be turned: all but its sizes."""
+    shown = {name: value for name, value in target.to_dict().items() if not name.endswith("_m")}
+    return shown | {"rows and columns": sorted((shown.pop("rows", 0), shown.pop("columns", 0)))}
 
 
 def _text(value: object, what: str, expected: str) -> str:
@@ -149,12 +142,24 @@ def _text(value: object, what: str, expected: str) -> str:
     return value
 
 
-def _beside(file: Path, value: object, rest: Mapping[str, Any], what: str) -> Path:
-    """Return the file that a field names; nothing else may be said then."""
-    name = _text(value, what, "the name of a file")
+def _either(
+    file: Path,
+    rest: dict[str, Any],
+    what: str,
+    field: str,
+    readers: tuple[Callable[[Path], T], Callable[[object], T]],
+) -> T:
+    """Return what a table says, in a file that its field names, or in the table itself."""
+    of_file, of_fields = readers
+    named = rest.pop(field, None)
+    if named is None:
+        with located(what):
+            return of_fields(rest)
+    name = _text(named, f"{what}: {field}", "the name of a file")
     if rest:
         raise InputError(
-            f"{what}: a file, and {', '.join(map(str, rest))[:100]} beside it; expected one or the other",
+            f"{what}: {field} names a file, and {', '.join(map(str, rest))[:100]} beside it; expected one or "
+            "the other",
             code=Code.INVALID_FIELD,
         )
-    return file.parent / name
+    return of_file(file.parent / name)

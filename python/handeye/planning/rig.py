@@ -4,6 +4,9 @@ The robot's error at a station is the same for all of its views, so their inform
 pair of camera and target gives the information of its pixels on the parameters and on that error; summed over
 the pairs, the error is then eliminated, ``I = H_tt - H_tu (H_uu + 1)^-1 H_ut``. As that is costly for many
 candidates, those are looked at whose gains, each camera for itself, sum up to the most.
+
+Of what is asked for, a pose counts by the determinant of its covariance, and what is touched by the cube of
+its mean square error: the same measure for an error that is as large along all three axes.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -176,7 +179,7 @@ def _combination(estimate: RigEstimate, aim: Aim) -> FloatArray:
 
 
 def _touches(estimate: RigEstimate, camera: str, work: Work) -> FloatArray:
-    """(m, n) rows whose squares sum up, over a covariance, to three times the mean square of touch errors."""
+    """(m, n) rows whose squares sum up, over a covariance, to the mean square of touch errors."""
     pair = seen_most(estimate, camera)
     one = estimate.of_pair(*pair)
     laid = lay_out(one, estimate.fit.measurements.pairs[pair], work)

@@ -269,10 +269,7 @@ def check_fingerprints(settings: Mapping[str, Any], found: Mapping[str, str]) ->
     InputError
         It is another.
     """
-    words = {
-        "arm": "the arm (its description, the limits of its driver)",
-        "recorded": "the recording that is replayed",
-    }
+    words = {"arm": "the description of the arm", "recorded": "the recording that is replayed"}
     for name, fingerprint in found.items():
         # Sessions of version 1 do not say.
         if settings.get(name, fingerprint) != fingerprint:

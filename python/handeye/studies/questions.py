@@ -21,6 +21,7 @@ from handeye.types import Charuco, Chessboard, CircleGrid, Mounting, Target
 from handeye.types.units import MM_PER_M
 
 VIEWS = (6, 12)
+_USUAL = ViewLimits()
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,8 @@ class AskedCell:
     arm_errors: float = 1.0
     pixel_sigma: float = 0.05
     mounting: Mounting = Mounting.EYE_IN_HAND
-    distance_mm: tuple[float, float] = (250.0, 900.0)
-    tilt_deg: float = 45.0
+    distance_mm: tuple[float, float] = (_USUAL.distance_m[0] * MM_PER_M, _USUAL.distance_m[1] * MM_PER_M)
+    tilt_deg: float = float(np.rad2deg(_USUAL.tilt_rad))
     lens: str = ORDINARY
     focal_px: float | None = None
 
@@ -55,7 +56,7 @@ class AskedCell:
         return Configuration(
             self.robot,
             mounting=self.mounting,
-            limits=ViewLimits((nearest, farthest), float(np.deg2rad(self.tilt_deg)), 20.0),
+            limits=ViewLimits((nearest, farthest), float(np.deg2rad(self.tilt_deg))),
             simulation=Simulation(
                 ArmErrors(**errors),
                 points_only=self.pixel_sigma,
