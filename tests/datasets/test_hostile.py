@@ -1,5 +1,6 @@
 """Files of strangers: whatever they hold, the caller sees our errors and no others."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from datasets.layouts import RCT_FILES, some_recording, write_rct, write_rwhe
 from datasets.test_pose_pairs import easy_samples, moveit_samples, stations, visp_pose
 from handeye.datasets import load, read_poses, read_recording, write_recording
 from handeye.errors import InputError
-from handeye.types import Mounting
+from handeye.types import Mounting, Pose
 from importing.test_streams import WRITERS, certifiable
 from strategies import mutated
 
@@ -82,15 +83,15 @@ def without_pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path
     return poses_alone(tmp_path_factory.mktemp("hostile"))
 
 
-def poses_alone(root: Path) -> dict[str, Path]:
+def poses_alone(root: Path, listed: Sequence[tuple[Pose, Pose]] = ()) -> dict[str, Path]:
     """Write one small set of every layout that has poses in the place of pictures."""
-    listed = stations(Mounting.EYE_IN_HAND, 3)
-    times = [0.0, 0.1, 0.2]
+    listed = listed or stations(Mounting.EYE_IN_HAND, 3)
+    times = [0.1 * k for k in range(len(listed))]
     streams = times, [pose for pose, _ in listed], times, [seen for _, seen in listed]
     folders = {name: root / name for name in LAYOUTS}
     for folder in folders.values():
         folder.mkdir()
-    (folders["easy_handeye2"] / "a.samples").write_text(easy_samples(Mounting.EYE_IN_HAND))
+    (folders["easy_handeye2"] / "a.samples").write_text(easy_samples(Mounting.EYE_IN_HAND, listed=listed))
     (folders["moveit"] / "samples.yaml").write_text(moveit_samples(listed))
     for k, (pose, seen) in enumerate(listed, start=1):
         (folders["visp"] / f"pose_rPe_{k}.yaml").write_text(visp_pose(pose))

@@ -29,7 +29,9 @@ def transform(pose: Pose, indent: str) -> str:
     )
 
 
-def easy_samples(mounting: Mounting, kind: str = "", wrong: int = 0) -> str:
+def easy_samples(
+    mounting: Mounting, kind: str = "", wrong: int = 0, listed: Sequence[tuple[Pose, Pose]] = ()
+) -> str:
     """As easy_handeye2 writes them: its parameters empty, `robot` the other way round beside the robot.
 
     The target of the first `wrong` samples is that of the last.
@@ -37,7 +39,7 @@ def easy_samples(mounting: Mounting, kind: str = "", wrong: int = 0) -> str:
     parts = [
         f"parameters:\n  name: ''\n  calibration_type: '{kind}'\n  freehand_robot_movement: false\nsamples:\n"
     ]
-    listed = stations(mounting)
+    listed = listed or stations(mounting)
     for index, (pose, right) in enumerate(listed):
         seen = listed[-1][1] if index < wrong else right
         robot = pose if mounting is Mounting.EYE_IN_HAND else pose.inverse()

@@ -3,14 +3,14 @@
 import numpy as np
 
 from handeye.estimation import AutoEstimator, Measurements
-from handeye.planning.hindsight import hindsight
+from handeye.planning.hindsight import Pictures, hindsight
 from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 
 
 def test_a_recording_in_hindsight() -> None:
     recording = simulate(ErrorKind.WHITE_FLANGE, 3, CellOptions(views=(9, 9)))
     measurements = Measurements.of_recording(recording)
-    found = hindsight(measurements, AutoEstimator())
+    found = hindsight(Pictures(measurements, AutoEstimator()))
     names = [view.name for view in recording.views]
     assert [step.view for step in found.steps] == names[2:]
     assert sorted(step.view for step in found.planned) == sorted(names[2:])

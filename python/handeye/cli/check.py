@@ -1,5 +1,6 @@
 """`handeye check`: whether camera, board and arm still are where the calibration says."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,16 +13,18 @@ from handeye.cli.arm import ArmSource
 from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, check_picture, write_figure, write_json
-from handeye.cli.source import Source
+from handeye.cli.source import Source, mindful_of
 from handeye.codes import Code
+from handeye.datasets import PosePair, PosePairs
 from handeye.datasets.check_log import LoggedCheck, alike, append_check, read_check_log
 from handeye.datasets.images import read_image
 from handeye.detection import NotFound, detect
 from handeye.errors import ExitCode, InputError, printable
-from handeye.estimation import Estimate, Measurements, make_estimator, require_determined
+from handeye.estimation import Measurements, make_estimator, require_determined
 from handeye.estimation.change import change_of
 from handeye.estimation.faults import examine
 from handeye.estimation.shift import Check, check_views, plan_check
+from handeye.importing import check_poses, plan_pose_check, solve_poses
 from handeye.types import Recording, View
 from handeye.types.calibration import ModelName
 from handeye.types.units import MM_PER_M
@@ -82,23 +85,58 @@ def check(
         raise UsageError("--at says where a picture was taken, and no picture is given")
     if views is None and log is not None:
         raise UsageError("--log keeps checks, and no views are given to check with")
-    opened = source.open(calibrated, arm.described())
-    kinematics = arm.kinematics(opened.recording.views, ModelName.AUTO)
-    known = examine(Measurements.of_recording(opened.recording)).measurements
-    estimate = make_estimator(ModelName.AUTO, kinematics)(known)
-    require_determined(estimate)
-    if views is None:
-        answer = _planned(estimate, known, plan or PLANNED, opened.recording.name)
+    opened = source.open_any(calibrated, arm.described())
+    if isinstance(opened, PosePairs):
+        answer = _of_poses(opened, views, plan or PLANNED, at, source, log, picture)
     else:
-        if at is not None:
-            new = (_pictured(views, at, opened.recording),)
+        recording = opened.recording
+        kinematics = arm.kinematics(recording.views, ModelName.AUTO)
+        known = examine(Measurements.of_recording(recording)).measurements
+        estimate = make_estimator(ModelName.AUTO, kinematics)(known)
+        require_determined(estimate)
+        if views is None:
+            joints = None if estimate.arm is None else known.joints
+            answer = _planned(
+                recording.name, known.views, *plan_check(estimate, known.motions, joints, plan or PLANNED)
+            )
         else:
-            new = _of_the_same(source.open(views, arm.described()).recording, opened.recording)
-        measured = Measurements.of(estimate.mounting, estimate.camera, estimate.target, new)
-        answer = _checked(check_views(estimate, measured), measured, opened.recording.name, log, picture)
+            if at is not None:
+                new = (_pictured(views, at, recording),)
+            else:
+                new = _of_the_same(source.open(views, arm.described()).recording, recording)
+            measured = Measurements.of(estimate.mounting, estimate.camera, estimate.target, new)
+            answer = _checked(check_views(estimate, measured), new, recording.name, log, picture)
     if output is not None:
         write_json(output, answer.data)
     return answer
+
+
+def _of_poses(
+    calibrated: PosePairs,
+    new: Path | None,
+    plan: int,
+    at: str | None,
+    source: Source,
+    log: Path | None,
+    picture: Path | None,
+) -> Answer:
+    """Check samples of poses against samples of poses."""
+    if at is not None:
+        raise UsageError(
+            f"--at takes a picture, and {calibrated.name} has poses of the target without pictures"
+        )
+    with mindful_of(calibrated.warnings):
+        solved = solve_poses(calibrated)
+    if new is None:
+        return _planned(calibrated.name, calibrated.pairs, *plan_pose_check(solved, plan))
+    opened = source.open_any(new)
+    if not isinstance(opened, PosePairs):
+        raise InputError(
+            f"{opened.recording.name}: pictures, the calibration has poses of the target without pictures",
+            code=Code.NO_POSES,
+            hint="give the poses of the target as the calibration's detector finds them, in the same layout",
+        )
+    return _checked(check_poses(solved, opened), opened.pairs, calibrated.name, log, picture)
 
 
 def _of_the_same(new: Recording, calibrated: Recording) -> tuple[View, ...]:
@@ -146,17 +184,15 @@ def _pictured(picture: Path, at: str, recording: Recording) -> View:
     return replace(there, name=f"at_{at}", point_ids=found.point_ids, pixels=found.pixels, sigmas_px=None)
 
 
-def _planned(estimate: Estimate, known: Measurements, count: int, name: str) -> Answer:
-    joints = None if estimate.arm is None else known.joints
-    chosen, detectable = plan_check(estimate, known.motions, joints, count)
+def _planned(name: str, known: Sequence[View | PosePair], chosen: list[int], detectable: float) -> Answer:
     data: dict[str, Any] = {
         "recording": name,
         "detectable_mm": MM_PER_M * detectable,
         "poses": [
             {
-                "name": known.views[i].name,
-                "T_base_flange": known.views[i].T_base_flange.to_list(),
-                "joints_rad": list(known.views[i].joints_rad or ()) or None,
+                "name": known[i].name,
+                "T_base_flange": known[i].T_base_flange.to_list(),
+                "joints_rad": list(getattr(known[i], "joints_rad", None) or ()) or None,
             }
             for i in chosen
         ],
@@ -174,7 +210,7 @@ def _planned(estimate: Estimate, known: Measurements, count: int, name: str) -> 
 
 
 def _checked(
-    found: Check, measured: Measurements, name: str, log: Path | None, picture: Path | None
+    found: Check, new: Sequence[View | PosePair], name: str, log: Path | None, picture: Path | None
 ) -> Answer:
     data: dict[str, Any] = {"recording": name, **found.to_dict(), "log": None}
     if log is not None:
@@ -184,7 +220,7 @@ def _checked(
             found.moved.value,
             found.sentence,
             found.misfit,
-            tuple(tuple(view.T_base_flange.matrix[:3].ravel().tolist()) for view in measured.views),
+            tuple(tuple(view.T_base_flange.matrix[:3].ravel().tolist()) for view in new),
         )
         earlier = read_check_log(log)
         append_check(log, now)

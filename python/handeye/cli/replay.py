@@ -1,20 +1,23 @@
 """`handeye replay`: what a recording brought, view by view, and what planning would have made of it."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handeye.cli.answer import Answer
 from handeye.cli.arm import ArmSource
+from handeye.cli.failures import UsageError
 from handeye.cli.options import Common
 from handeye.cli.output import check_output, write_json
 from handeye.cli.page import Curve, Page, serve, show_views
 from handeye.cli.progress import progress
-from handeye.cli.source import Source
+from handeye.cli.source import Source, mindful_of
+from handeye.datasets import PosePairs
 from handeye.estimation import Measurements, make_estimator
 from handeye.estimation.faults import examine
-from handeye.importing import Opened
-from handeye.planning.hindsight import START, After, Hindsight, hindsight
+from handeye.importing import Opened, Posed, solve_poses
+from handeye.planning.hindsight import START, After, Hindsight, Pictures, hindsight
 from handeye.robots import ArmKinematics
 from handeye.types.calibration import ModelName
 
@@ -40,21 +43,37 @@ def replay(
     Parameters
     ----------
     folder
-        Folder with the views, in any layout that solve reads.
+        Folder with the views, in any layout that solve reads, poses of the target without pictures too.
     output
         Also write the JSON object to this file.
     """
     check_output(output)
-    opened = source.open(folder, arm.described())
-    kinematics = arm.kinematics(opened.recording.views, ModelName.AUTO)
-    known = examine(Measurements.of_recording(opened.recording)).measurements
-    with progress("Going through the views"):
-        found = hindsight(known, make_estimator(ModelName.AUTO, kinematics))
-    data: dict[str, Any] = {"recording": opened.recording.name, "views": len(known), **found.to_dict()}
+    opened = source.open_any(folder, arm.described())
+    after = None
+    if isinstance(opened, PosePairs):
+        if page.ui:
+            raise UsageError(f"--ui shows views, and {opened.name} has poses of the target without pictures")
+        data = _of_poses(opened)
+    else:
+        kinematics = arm.kinematics(opened.recording.views, ModelName.AUTO)
+        known = examine(Measurements.of_recording(opened.recording)).measurements
+        with progress("Going through the views"):
+            found = hindsight(Pictures(known, make_estimator(ModelName.AUTO, kinematics)))
+        data = {"recording": opened.recording.name, "views": len(known), **found.to_dict()}
+        if page.ui:
+            after = partial(_page, page, opened, known, found, kinematics, arm.robot)
     if output is not None:
         write_json(output, data)
-    after = None if not page.ui else partial(_page, page, opened, known, found, kinematics, arm.robot)
     return Answer(data, lambda console: _show(console, data), after)
+
+
+def _of_poses(pairs: PosePairs) -> dict[str, Any]:
+    with mindful_of(pairs.warnings):
+        used = solve_poses(pairs).used
+    kept = replace(pairs, pairs=tuple(pair for pair, good in zip(pairs.pairs, used, strict=True) if good))
+    with progress("Going through the samples"):
+        found = hindsight(Posed(kept))
+    return {"recording": pairs.name, "views": len(kept), **found.to_dict()}
 
 
 def _page(
@@ -69,7 +88,7 @@ def _page(
         page,
         opened,
         known,
-        found.final,
+        make_estimator(ModelName.AUTO, kinematics)(known),
         arm=None if kinematics is None else kinematics.arm,
         description=description,
         known=_curve(found.steps),

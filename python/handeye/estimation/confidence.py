@@ -135,3 +135,34 @@ def ellipsoid(
     scale = 3 * f_quantile(probability, 3, degrees_of_freedom)
     lengths = np.sqrt(np.clip(variances, 0, None) * scale)
     return Ellipsoid(probability, lengths[::-1].copy(), vectors.T[::-1].copy())
+
+
+def foretold(before: FloatArray, whole: FloatArray, after: FloatArray, *, comes_again: bool) -> FloatArray:
+    """Covariances (..., 6, 6) of X after stations that would leave these by the information alone.
+
+    In units of what the information leaves before them, the covariance of the estimate has values above
+    one along some axes. Where the arm is not described that excess is what comes again in every view, and
+    stays; elsewhere it is what is not known of the noise, and falls with the rest.
+
+    Parameters
+    ----------
+    before, whole
+        (6, 6) what the information leaves now, and the covariance of the estimate.
+    after
+        (..., 6, 6) what the information leaves after them.
+    comes_again
+        Whether what `whole` exceeds `before` by stays.
+
+    Examples
+    --------
+    >>> foretold(np.eye(6), 2 * np.eye(6), 0.5 * np.eye(6), comes_again=True)[0, 0].item()
+    1.5
+    """
+    root = np.linalg.cholesky(before)
+    inverse = np.linalg.inv(root)
+    values, axes = np.linalg.eigh(inverse @ whole @ inverse.T)
+    kept = np.maximum(values - 1.0, 0.0) if comes_again else np.zeros(6)
+    scale = np.sqrt(np.maximum(values - kept, 0.0))
+    relative = axes.T @ inverse @ after @ inverse.T @ axes
+    back = root @ axes
+    return np.asarray(back @ (scale[:, np.newaxis] * relative * scale + np.diag(kept)) @ back.T)

@@ -25,7 +25,7 @@ from handeye.estimation.estimate import Estimate
 from handeye.estimation.f_distribution import f_cumulative
 from handeye.estimation.measurements import Measurements
 from handeye.types.arrays import FloatArray
-from handeye.types.pose import inverses
+from handeye.types.pose import Pose, inverses
 
 # An alarm is what is less likely than this where nothing has moved. Real arms err in ways that the model does
 # not have: of made-up ones about twice as many alarm falsely.
@@ -190,10 +190,26 @@ def check_views(estimate: Estimate, views: Measurements, alarm: float = ALARM) -
     """
     if len(views) == 0:
         raise InputError("no view to check with", code=Code.TOO_FEW_VIEWS, hint="take two, of the same board")
-    rows = rows_of(estimate, views)
+    names = tuple(view.name for view in views.views)
+    return check_rows(rows_of(estimate, views), estimate.degrees_of_freedom, names, alarm)
+
+
+def check_rows(rows: Rows, freedom: float, names: tuple[str, ...], alarm: float = ALARM) -> Check:
+    """Test whether what new views miss by is what is left where nothing has moved.
+
+    Parameters
+    ----------
+    rows
+        The new views, linearised.
+    freedom
+        Degrees of freedom of the noise levels behind their covariance.
+    names
+        Of the views.
+    alarm
+        Chance of a false alarm.
+    """
     whitened, root = _whitened(rows)
     squared = float(whitened @ whitened)
-    freedom = estimate.degrees_of_freedom
     causes: list[Cause] = []
     for (moved, joint), columns in rows.shifts.items():
         onto = np.linalg.solve(root, columns)
@@ -228,7 +244,7 @@ def check_views(estimate: Estimate, views: Measurements, alarm: float = ALARM) -
         found,
         causes[0].moved if found else Moved.NOTHING,
         tuple(causes),
-        tuple(view.name for view in views.views),
+        names,
         1e3 * _detectable(onto.T @ onto),
         tuple(whitened.tolist()),
     )
@@ -304,27 +320,48 @@ def _chain_rows(
     estimate: Estimate, motions: FloatArray, joints: FloatArray | None
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Chains (K, 4, 4), rows of parameters (K, 6, n), noise of the arm, rows per joint (K, 6, j)."""
-    count = len(motions)
-    before = np.ascontiguousarray(estimate.X.matrix @ motions)
-    of_x, of_y = estimate.X.adjoint(), _core.se3_adjoint(before)
-    rows = np.zeros((count, _TWIST, len(estimate.covariance)))
+    chains, of_chain, noise = chain_rows(
+        estimate.X, estimate.Y, motions, estimate.expected_noise.roots(estimate.mounting)
+    )
+    rows = np.zeros((len(motions), _TWIST, len(estimate.covariance)))
+    rows[:, :, : 2 * _TWIST] = of_chain
+    arm, of_x = estimate.arm, estimate.X.adjoint()
+    if arm is None or joints is None:
+        return chains, rows, noise, np.zeros((len(motions), _TWIST, 0))
+    roots, constants = arm.candidates(estimate.mounting, joints, estimate.expected_noise.joint_rad)
+    rows[:, :, -arm.constants :] = of_x @ constants
+    moved = of_x @ roots
+    by_joint = of_x @ arm.kinematics.motion_jacobians(estimate.mounting, joints)
+    return chains, rows, noise + moved @ np.swapaxes(moved, 1, 2), by_joint
+
+
+def chain_rows(
+    X: Pose, Y: Pose, motions: FloatArray, robot: tuple[FloatArray | None, FloatArray | None]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Chains `X A Y` (K, 4, 4), how twists of X and Y move them (K, 6, 12), and the robot's noise (K, 6, 6).
+
+    Parameters
+    ----------
+    X, Y
+        Of the chain.
+    motions
+        (K, 4, 4) A of each station.
+    robot
+        Roots (6, 6) of the covariances of the robot's error on the left and on the right of A.
+    """
+    before = np.ascontiguousarray(X.matrix @ motions)
+    of_x, of_y = X.adjoint(), _core.se3_adjoint(before)
+    rows = np.zeros((len(motions), _TWIST, 2 * _TWIST))
     rows[:, :, :_TWIST] = np.eye(_TWIST)
-    rows[:, :, _TWIST : 2 * _TWIST] = of_y
-    left, right = estimate.expected_noise.roots(estimate.mounting)
-    noise = np.zeros((count, _TWIST, _TWIST))
+    rows[:, :, _TWIST:] = of_y
+    left, right = robot
+    noise = np.zeros((len(motions), _TWIST, _TWIST))
     if left is not None:
         noise += of_x @ left @ (of_x @ left).T
     if right is not None:
         moved = of_y @ right
         noise += moved @ np.swapaxes(moved, 1, 2)
-    arm = estimate.arm
-    if arm is None or joints is None:
-        return before @ estimate.Y.matrix, rows, noise, np.zeros((count, _TWIST, 0))
-    roots, constants = arm.candidates(estimate.mounting, joints, estimate.expected_noise.joint_rad)
-    rows[:, :, -arm.constants :] = of_x @ constants
-    moved = of_x @ roots
-    by_joint = of_x @ arm.kinematics.motion_jacobians(estimate.mounting, joints)
-    return before @ estimate.Y.matrix, rows, noise + moved @ np.swapaxes(moved, 1, 2), by_joint
+    return before @ Y.matrix, rows, noise
 
 
 def plan_check(
@@ -340,25 +377,47 @@ def plan_check(
     InputError
         Fewer candidates than views.
     """
-    if len(motions) < count or count < 2:
-        raise InputError(
-            f"{len(motions)} candidates for {count} views of a check, at least two of each are needed",
-            code=Code.TOO_FEW_VIEWS,
-        )
     _, rows, noise, _ = _chain_rows(estimate, motions, joints)
-    noise = noise + _predicted_pixels(estimate, motions)
-    usable = [i for i in range(len(motions)) if np.isfinite(noise[i]).all()]
-    if len(usable) < count:
+    return choose_rows(estimate.covariance, rows, noise + _predicted_pixels(estimate, motions), count)
+
+
+def choose_rows(
+    covariance: FloatArray, rows: FloatArray, noise: FloatArray, count: int
+) -> tuple[list[int], float]:
+    """Choose views as `plan_check` does, by what they depend on and what is new in each.
+
+    Parameters
+    ----------
+    covariance
+        (n, n) of the parameters, X and Y first.
+    rows
+        (N, 6, n) how the twist of each candidate depends on them.
+    noise
+        (N, 6, 6) what is new in it; not finite where it cannot be taken.
+    count
+        How many to choose.
+
+    Raises
+    ------
+    InputError
+        Fewer candidates than views.
+    """
+    usable = [i for i in range(len(rows)) if np.isfinite(noise[i]).all()]
+    if len(usable) < count or count < 2:
         raise InputError(
-            f"{len(usable)} of {len(motions)} candidates show the board, {count} are needed",
+            f"{len(usable)} of {len(rows)} candidates show the board, {count} are needed, at least two",
             code=Code.TOO_FEW_VIEWS,
         )
+
+    def worth(views: Sequence[int]) -> tuple[float, float]:
+        return _worth(covariance, rows, noise, views)
+
     pairs = [(i, j) for i in usable for j in usable if j < i]
-    chosen = sorted(max(pairs, key=lambda pair: _worth(estimate, rows, noise, pair)[0]))
+    chosen = sorted(max(pairs, key=lambda pair: worth(pair)[0]))
     while len(chosen) < count:
         left = [i for i in usable if i not in chosen]
-        chosen.append(max(left, key=lambda i: _worth(estimate, rows, noise, (*chosen, i))[0]))
-    return chosen, _worth(estimate, rows, noise, chosen)[1]
+        chosen.append(max(left, key=lambda i: worth((*chosen, i))[0]))
+    return chosen, worth(chosen)[1]
 
 
 def _predicted_pixels(estimate: Estimate, motions: FloatArray) -> FloatArray:
@@ -382,12 +441,12 @@ def _predicted_pixels(estimate: Estimate, motions: FloatArray) -> FloatArray:
 
 
 def _worth(
-    estimate: Estimate, rows: FloatArray, noise: FloatArray, views: Sequence[int]
+    parameters: FloatArray, rows: FloatArray, noise: FloatArray, views: Sequence[int]
 ) -> tuple[float, float]:
     """Return the worth of some views, and the shift that they find in half of all cases, metres."""
     some = rows[list(views)]
     stacked = some.reshape(-1, some.shape[2])
-    covariance = stacked @ estimate.covariance @ stacked.T
+    covariance = stacked @ parameters @ stacked.T
     for k, view in enumerate(views):
         at = slice(_TWIST * k, _TWIST * (k + 1))
         covariance[at, at] += noise[view]

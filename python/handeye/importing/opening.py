@@ -165,7 +165,7 @@ def open_folder(
         raise InputError(
             f"{opened.name}: poses of the target without pictures, expected pictures or corners",
             code=Code.NO_PICTURES,
-            hint="handeye solve takes it; other commands need what the camera saw",
+            hint="handeye solve, replay, check and export take it; other commands need what the camera saw",
         )
     return opened
 

@@ -40,8 +40,9 @@ class PosesSolved:
         What it rests on.
     X, Y
         Of the chain ``T_camera_target = X A Y``.
-    covariance
-        (6, 6) covariance of the twist of X, translation first: as that of a `Calibration`.
+    chain_covariance, information
+        (12, 12) of the twists of X and Y, translation first: their covariance, and what that of a further
+        station adds to. What comes again at every station is in the covariance only.
     degrees_of_freedom
         Of the noise levels behind it.
     levels
@@ -55,7 +56,8 @@ class PosesSolved:
     pairs: PosePairs
     X: Pose
     Y: Pose
-    covariance: FloatArray
+    chain_covariance: FloatArray
+    information: FloatArray
     degrees_of_freedom: float
     levels: Mapping[str, float]
     distances_m: FloatArray
@@ -66,6 +68,11 @@ class PosesSolved:
     def results(self) -> Mapping[str, Pose]:
         """What people ask for under its name, such as `T_flange_camera`."""
         return self.pairs.mounting.results(self.X, self.Y)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(6, 6) covariance of the twist of X, translation first: as that of a `Calibration`."""
+        return self.chain_covariance[:6, :6]
 
     @property
     def within_95(self) -> Within:
@@ -104,7 +111,6 @@ def solve_poses(pairs: PosePairs) -> PosesSolved:
         raise InputError(
             f"{pairs.name}: {len(pairs)} samples, at least {MIN_VIEWS} are needed", code=Code.TOO_FEW_VIEWS
         )
-    motions, seen = pairs.motions, pairs.camera_poses
     kept, x, y = _first_fit(pairs)
     distance, angle = _half_within(pairs, x, y)
     if angle > FITS_RAD or distance > FITS_M:
@@ -115,6 +121,24 @@ def solve_poses(pairs: PosePairs) -> PosesSolved:
             hint=_other_mounting(pairs)
             or "are both in metres, in the same order, and the poses of the target those in the camera?",
         )
+    return _solved(pairs, kept, x, y)
+
+
+def solve_some(pairs: PosePairs, kept: list[int]) -> PosesSolved:
+    """Return X and Y that fit some of the samples, which are taken to be right.
+
+    Raises
+    ------
+    DegenerateError
+        These stations do not turn about two axes.
+    SolveError
+        No X and Y fit.
+    """
+    return _solved(pairs, kept, *first_fit(pairs.motions[kept], pairs.camera_poses[kept]))
+
+
+def _solved(pairs: PosePairs, kept: list[int], x: FloatArray, y: FloatArray) -> PosesSolved:
+    motions, seen = pairs.motions, pairs.camera_poses
     posterior = _posterior(pairs, kept, x, y)
     X, Y = Pose(posterior.x[0]), Pose(posterior.y[0])
     angles, distances = chain_errors(X.matrix @ motions @ Y.matrix, seen)
@@ -122,7 +146,8 @@ def solve_poses(pairs: PosePairs) -> PosesSolved:
         pairs,
         X,
         Y,
-        np.asarray(posterior.covariance)[:6, :6],
+        np.asarray(posterior.covariance),
+        np.asarray(posterior.information),
         posterior.degrees_of_freedom[0],
         dict(zip(posterior.level_names, posterior.levels[0], strict=True)),
         distances,

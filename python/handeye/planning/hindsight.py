@@ -2,16 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from handeye import _core
+from handeye.codes import Code
+from handeye.errors import InputError
 from handeye.estimation import Estimate, Estimator, Measurements
 from handeye.estimation.confidence import Within, within
 from handeye.estimation.initialize import check_views
 from handeye.planning.prediction import Prediction, Sight, gains
+from handeye.types.arrays import FloatArray
 
+E = TypeVar("E")
 # A view that takes less than this off both radii did nothing.
 NOTHING = 0.02
 START = 3
@@ -37,6 +41,37 @@ class After:
     useless: bool
 
 
+class Stations(Protocol[E]):
+    """What is gone through again: stations in the order in which they were taken, and estimates from some.
+
+    Examples
+    --------
+    >>> Pictures(measurements, AutoEstimator()).names[0] == recording.views[0].name  # is one
+    True
+    """
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the stations."""
+        ...
+
+    def solve(self, chosen: list[int], previous: E | None) -> E | None:
+        """Estimate from some of them, an earlier estimate as a start; None where there is no answer."""
+        ...
+
+    def known(self, estimate: E) -> Within | None:
+        """How far off an estimate may be; None while something is open."""
+        ...
+
+    def worth(self, estimate: E, left: list[int]) -> FloatArray:
+        """(len(left),) what stations would add to an estimate; NaN where that cannot be said."""
+        ...
+
+    def more(self, estimate: E, count: int) -> tuple[tuple[str, ...], Within | None]:
+        """Choose poses to go to once more: their names, and how far off the answer may be then."""
+        ...
+
+
 @dataclass(frozen=True)
 class Hindsight:
     """What a recording brought.
@@ -53,8 +88,6 @@ class Hindsight:
         Recorded poses that would help most if pictures were taken there once more.
     then
         Radii predicted after those.
-    final
-        What all views say.
     """
 
     steps: tuple[After, ...]
@@ -62,7 +95,6 @@ class Hindsight:
     enough: int | None
     repeat: tuple[str, ...]
     then: Within | None
-    final: Estimate
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
@@ -86,62 +118,57 @@ class Hindsight:
         }
 
 
-def hindsight(measurements: Measurements, estimator: Estimator) -> Hindsight:
+def hindsight(stations: Stations[E]) -> Hindsight:
     """Go through a recording again.
 
     Raises
     ------
     InputError
-        Fewer than three usable views.
+        Fewer than three stations.
     """
-    check_views(measurements)
-    count = len(measurements)
+    count = len(stations.names)
+    if count < START:
+        raise InputError(f"{count} views, at least {START} are needed", code=Code.TOO_FEW_VIEWS)
     recorded = [list(range(k)) for k in range(START, count + 1)]
-    estimates = _estimates(measurements, estimator, recorded)
-    final = estimates[-1]
-    steps = _after(measurements, recorded, estimates)
+    final = None
+    found: list[E | None] = []
+    for order in recorded:
+        final = stations.solve(order, final)
+        found.append(final)
+    steps = _after(stations, recorded, found)
     chosen = list(range(START))
-    orders, planned = [list(chosen)], [estimates[0]]
+    orders, planned = [list(chosen)], [found[0]]
     left = list(range(START, count))
     while left:
-        pool = measurements.select(left)
-        joints = None if planned[-1].arm is None else pool.joints
-        worth = gains(planned[-1], _core.Criterion("entropy"), pool.motions, Sight(known=True), joints=joints)
+        now = planned[-1]
+        worth = np.full(len(left), np.nan) if now is None else stations.worth(now, left)
         best = 0 if np.isnan(worth).all() else int(np.nanargmax(worth))
         chosen = [*chosen, left.pop(best)]
         orders.append(chosen)
-        planned.append(estimator(measurements.select(chosen), planned[-1]))
-    by_plan = _after(measurements, orders, planned)
-    enough = None
-    if final.determined:
-        good = [k for k, one in enumerate(planned) if one.determined and _reaches(one, final)]
-        enough = START + good[0] if good else None
-    repeat, then = _repeated(measurements, final)
-    return Hindsight(steps, by_plan, enough, repeat, then, final)
+        planned.append(stations.solve(chosen, planned[-1]))
+    by_plan = _after(stations, orders, planned)
+    reached = steps[-1].within
+    good = [k for k, step in enumerate(by_plan) if reached is not None and _reaches(step.within, reached)]
+    repeat, then = ((), None) if final is None or reached is None else stations.more(final, MORE)
+    return Hindsight(steps, by_plan, START + good[0] if good else None, repeat, then)
 
 
-def _estimates(
-    measurements: Measurements, estimator: Estimator, orders: Sequence[list[int]]
-) -> list[Estimate]:
-    found: list[Estimate] = []
-    for order in orders:
-        found.append(estimator(measurements.select(order), found[-1] if found else None))
-    return found
-
-
-def _reaches(one: Estimate, other: Estimate) -> bool:
+def _reaches(one: Within | None, other: Within) -> bool:
     """Tell whether an estimate is as good as another, up to what counts as nothing."""
-    a, b = one.within_95, other.within_95
     most = 1 + NOTHING
-    return a.translation_mm <= most * b.translation_mm and a.rotation_deg <= most * b.rotation_deg
+    return (
+        one is not None
+        and one.translation_mm <= most * other.translation_mm
+        and one.rotation_deg <= most * other.rotation_deg
+    )
 
 
 def _after(
-    measurements: Measurements, orders: Sequence[list[int]], estimates: Sequence[Estimate]
+    stations: Stations[E], orders: Sequence[list[int]], estimates: Sequence[E | None]
 ) -> tuple[After, ...]:
     steps: list[After] = []
     for order, estimate in zip(orders, estimates, strict=True):
-        now = estimate.within_95 if estimate.determined else None
+        now = None if estimate is None else stations.known(estimate)
         before = steps[-1].within if steps else None
         useless = (
             now is not None
@@ -149,26 +176,65 @@ def _after(
             and now.translation_mm > (1 - NOTHING) * before.translation_mm
             and now.rotation_deg > (1 - NOTHING) * before.rotation_deg
         )
-        steps.append(After(measurements.views[order[-1]].name, now, useless))
+        steps.append(After(stations.names[order[-1]], now, useless))
     return tuple(steps)
 
 
-def _repeated(measurements: Measurements, final: Estimate) -> tuple[tuple[str, ...], Within | None]:
-    """Choose recorded poses to take pictures at once more, and predict what they bring."""
-    if not final.determined:
-        return (), None
-    joints = None if final.arm is None else measurements.joints
-    prediction = Prediction(final, Sight(known=True))
-    views = prediction.informations(measurements.motions, joints)
-    information = final.information
-    names: list[str] = []
-    for _ in range(MORE):
-        now = Prediction(replace(final, information=information), Sight(known=True))
-        worth = now.gains(_core.Criterion("entropy_handeye"), measurements.motions, joints)
-        if np.isnan(worth).all():
-            return (), None
-        best = int(np.nanargmax(worth))
-        names.append(measurements.views[best].name)
-        information = information + views[best]
-    covariance = np.asarray(np.linalg.inv(information), np.float64)[:6, :6]
-    return tuple(names), within(prediction.predicted(covariance), final.degrees_of_freedom)
+@dataclass(frozen=True)
+class Pictures:
+    """Views with pictures, as `Stations`.
+
+    Raises
+    ------
+    InputError
+        Fewer than three usable views.
+
+    Examples
+    --------
+    >>> hindsight(Pictures(measurements.select([0, 1, 2, 3]), AutoEstimator())).steps[0].view
+    'view_003'
+    """
+
+    measurements: Measurements
+    estimator: Estimator
+
+    def __post_init__(self) -> None:
+        check_views(self.measurements)
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the views."""
+        return [view.name for view in self.measurements.views]
+
+    def solve(self, chosen: list[int], previous: Estimate | None) -> Estimate:
+        """Estimate from some views."""
+        return self.estimator(self.measurements.select(chosen), previous)
+
+    def known(self, estimate: Estimate) -> Within | None:
+        """How far off an estimate may be; None while something is open."""
+        return estimate.within_95 if estimate.determined else None
+
+    def worth(self, estimate: Estimate, left: list[int]) -> FloatArray:
+        """(len(left),) the gain of each view, in entropy."""
+        pool = self.measurements.select(left)
+        joints = None if estimate.arm is None else pool.joints
+        return gains(estimate, _core.Criterion("entropy"), pool.motions, Sight(known=True), joints=joints)
+
+    def more(self, estimate: Estimate, count: int) -> tuple[tuple[str, ...], Within | None]:
+        """Choose recorded poses to take pictures at once more, and predict what they bring."""
+        motions = self.measurements.motions
+        joints = None if estimate.arm is None else self.measurements.joints
+        prediction = Prediction(estimate, Sight(known=True))
+        views = prediction.informations(motions, joints)
+        information = estimate.information
+        names: list[str] = []
+        for _ in range(count):
+            now = Prediction(replace(estimate, information=information), Sight(known=True))
+            worth = now.gains(_core.Criterion("entropy_handeye"), motions, joints)
+            if np.isnan(worth).all():
+                return (), None
+            best = int(np.nanargmax(worth))
+            names.append(self.names[best])
+            information = information + views[best]
+        covariance = np.asarray(np.linalg.inv(information), np.float64)[:6, :6]
+        return tuple(names), within(prediction.predicted(covariance), estimate.degrees_of_freedom)

@@ -6,6 +6,7 @@ import numpy as np
 
 from handeye import _core
 from handeye.errors import DegenerateError
+from handeye.estimation.confidence import foretold
 from handeye.estimation.estimate import Estimate
 from handeye.types.arrays import BoolArray, FloatArray
 from handeye.types.pose import Pose
@@ -152,19 +153,11 @@ class Prediction:
     def predicted(self, after: FloatArray) -> FloatArray:
         """Covariances (..., 6, 6) of X after views that leave these by the information alone.
 
-        In units of what the information leaves before them, the covariance of the estimate has values above
-        one along some axes. Where the arm is not described that excess is what comes again in every view, and
-        stays; elsewhere it is what is not known of the noise, and falls with the rest.
+        See `handeye.estimation.confidence.foretold`.
         """
-        before, whole = self._belief.covariance[:6, :6], self.estimate.hand_eye_covariance
-        root = np.linalg.cholesky(before)
-        inverse = np.linalg.inv(root)
-        values, axes = np.linalg.eigh(inverse @ whole @ inverse.T)
-        kept = np.maximum(values - 1.0, 0.0) if self.estimate.arm is None else np.zeros(6)
-        scale = np.sqrt(np.maximum(values - kept, 0.0))
-        relative = axes.T @ inverse @ after @ inverse.T @ axes
-        back = root @ axes
-        return back @ (scale[:, np.newaxis] * relative * scale + np.diag(kept)) @ back.T
+        known = self.estimate.arm is not None
+        before = self._belief.covariance[:6, :6]
+        return foretold(before, self.estimate.hand_eye_covariance, after, comes_again=not known)
 
     def _arm(self, joints: FloatArray | None) -> tuple[FloatArray, FloatArray] | None:
         arm = self.estimate.arm
