@@ -37,7 +37,8 @@ def touch(
     touches
         Random places and postures in each.
     touch_mm
-        Also choose views one by one out of 40, by entropy and by touch error, and stop at this touch error.
+        Also choose views one by one out of 40, by entropy and by touch error, and stop at this touch error;
+        and how much less than entropy the best choice of all would leave, everything known.
     views
         Views after which entropy and touch error are compared.
     """
@@ -64,7 +65,8 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
     table.add_column("cells")
     planned = document["asked_mm"] is not None
     names = ["within", "error mm", "stated mm"]
-    names += ["by entropy mm", "by touch mm", "all 40 mm", "reached", "kept"] if planned else []
+    if planned:
+        names += ["by entropy mm", "by touch mm", "all 40 mm", "best choice", "reached", "kept"]
     for name in names:
         table.add_column(name, justify="right")
     for name, group in document["groups"].items():
@@ -73,6 +75,7 @@ def _show(console: "Console", document: dict[str, Any], written: list[Path]) -> 
         if planned:
             row += [figures(group["planned_by_entropy_mm"]), figures(group["planned_by_touch_mm"])]
             row += [figures(group["whole_pool_mm"])]
+            row += [f"{group['foretold_best_mm'] / group['foretold_by_entropy_mm'] - 1:.1%}"]
             row += [f"{group['asked_met']} of {document['cells']}", f"{group['asked_held']:.1%}"]
         table.add_row(*row)
     console.print(table)

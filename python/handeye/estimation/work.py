@@ -1,8 +1,10 @@
 """The touch error over a place of work: which points are seen and touched, and from where.
 
 A point of the box is seen as the board was seen in some of the views: the camera stands to the point as it
-stood to the middle of the board, or, beside the robot, where it is. The tool touches with the flange turned
-as in that view.
+stood to the middle of the board, or, beside the robot, where it is. With the camera in the hand the tool
+touches with the flange turned as in that view. Beside the robot that is how a board is held up to a camera,
+not how an arm works: there the tool points straight down, turned about the vertical as in that view, and
+only where the arm cannot do that as it was held.
 """
 
 from dataclasses import dataclass
@@ -15,7 +17,7 @@ from handeye.estimation.measurements import Measurements
 from handeye.estimation.touch import Depth, TouchError, Touches, limits, touch_error
 from handeye.types.arrays import BoolArray, FloatArray, IndexArray
 from handeye.types.mounting import Mounting
-from handeye.types.pose import inverses
+from handeye.types.pose import Pose, inverses
 from handeye.types.touch import TouchMap, WorkBox
 
 # Where nothing is said: a tool as long as an ordinary gripper, and at least this much around the board.
@@ -24,6 +26,7 @@ LEAST_SIDE_M = 0.1
 PER_AXIS = 3
 NOTHING_TO_TOUCH = "nothing_to_touch"
 POSTURES = 3
+_PARALLEL = 1e-9
 
 
 @dataclass(frozen=True)
@@ -133,17 +136,17 @@ def lay_out(estimate: Estimate, measurements: Measurements, work: Work) -> Laid:
     at: list[IndexArray] = []
     seen: list[FloatArray] = []
     touched: list[FloatArray] = []
+    held: list[FloatArray] = []
     postures: list[FloatArray] = []
     for k in sorted(views):
         flange = measurements.views[k].T_base_flange.matrix
         seeing = np.tile(flange, (len(grid), 1, 1))
         if in_hand:
             seeing[:, :3, 3] += grid - middle
-        touching = np.tile(flange, (len(grid), 1, 1))
-        touching[:, :3, 3] = grid - flange[:3, :3] @ tool
         at.append(np.arange(len(grid)))
         seen.append(seeing)
-        touched.append(touching)
+        held.append(_tip_at(grid, flange[:3, :3], tool))
+        touched.append(held[-1] if in_hand else _tip_at(grid, _pointing_down(flange[:3, :3], tool), tool))
         if estimate.arm is not None:
             postures.append(np.tile(measurements.joints[k], (len(grid), 1)))
     points = np.concatenate(at)
@@ -155,6 +158,12 @@ def lay_out(estimate: Estimate, measurements: Measurements, work: Work) -> Laid:
         kinematics = estimate.arm.kinematics
         first, there = kinematics.reach(laid.seen_from, np.concatenate(postures))
         second, also = kinematics.reach(laid.touched_from, first)
+        if not in_hand and not also.all():
+            as_held = np.concatenate(held)
+            other, held_too = kinematics.reach(as_held, first)
+            second[~also] = other[~also]
+            laid.touched_from[~also] = as_held[~also]
+            also = also | held_too
         reached = also & (there | (not in_hand))
         joints = (first, second)
     kept = visible & reached
@@ -181,6 +190,26 @@ def lay_out(estimate: Estimate, measurements: Measurements, work: Work) -> Laid:
         int((~reached).sum()),
         int((~visible).sum()),
     )
+
+
+def _tip_at(points: FloatArray, turn: FloatArray, tool: FloatArray) -> FloatArray:
+    """(Q, 4, 4) `T_base_flange` with the tip at points (Q, 3), the flange turned by (3, 3)."""
+    poses = np.tile(np.eye(4), (len(points), 1, 1))
+    poses[:, :3, :3] = turn
+    poses[:, :3, 3] = points - turn @ tool
+    return poses
+
+
+def _pointing_down(turn: FloatArray, tool: FloatArray) -> FloatArray:
+    """(3, 3) a turn of the flange by the least angle that lets a tool, (3,) in the flange, point down."""
+    length = float(np.linalg.norm(tool))
+    along = turn @ (tool / length if length > 0 else np.array([0.0, 0.0, 1.0]))
+    axis = np.cross(along, [0.0, 0.0, -1.0])
+    sine = float(np.linalg.norm(axis))
+    # Straight up: about any level axis.
+    axis = axis / sine if sine > _PARALLEL else np.array([1.0, 0.0, 0.0])
+    angle = float(np.arctan2(sine, -along[2]))
+    return Pose.exp([0.0, 0.0, 0.0, *(angle * axis)]).rotation @ turn
 
 
 def usual_box(estimate: Estimate, measurements: Measurements) -> WorkBox:

@@ -31,6 +31,7 @@ from handeye.simulation.cells import (
     simulate_cell,
     simulated_arm,
 )
+from handeye.studies.touch_choice import by_hindsight
 from handeye.types import Chessboard, Mounting, Pose, View
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
@@ -72,7 +73,11 @@ class TouchStudy:
 
 @dataclass(frozen=True)
 class CellResult:
-    """One cell: share of touches within the radius, errors and radii, and what planning gave."""
+    """One cell: share of touches within the radius, errors and radii, and what planning gave.
+
+    `choices_mm` are root mean square errors foretold by all views: of views chosen by entropy, by touch
+    error, and of the best choice that there is.
+    """
 
     held: float
     error_mm: float
@@ -81,6 +86,7 @@ class CellResult:
     entropy_mm: float = float("nan")
     touch_mm: float = float("nan")
     pool_mm: float = float("nan")
+    choices_mm: tuple[float, float, float] = (float("nan"), float("nan"), float("nan"))
     asked_held: float = float("nan")
     asked_met: bool = False
     asked_views: int = 0
@@ -143,6 +149,10 @@ def _summed(results: Sequence[CellResult]) -> dict[str, Any]:
         "planned_by_entropy_mm": mean("entropy_mm"),
         "planned_by_touch_mm": mean("touch_mm"),
         "whole_pool_mm": mean("pool_mm"),
+        **{
+            f"foretold_{name}_mm": float(np.mean([result.choices_mm[i] for result in results]))
+            for i, name in enumerate(("by_entropy", "by_touch", "best"))
+        },
         "asked_met": len(met),
         "asked_held": float(np.mean([result.asked_held for result in met])) if met else float("nan"),
         "asked_views": float(np.mean([result.asked_views for result in met])) if met else float("nan"),
@@ -323,11 +333,14 @@ def _planned(job: _Job, kind: ErrorKind, result: CellResult) -> CellResult:
     simulated = simulate_cell(kind, job.number, cell, seed=options.seed + 1)
     work = Work(_box(simulated))
     means: dict[str, float] = {}
+    choices: list[list[int]] = []
     stopped: tuple[Estimate, int] | None = None
     for criterion in ("entropy", "touch"):
         most = options.most_views if criterion == "touch" else options.views
-        for count, estimate, where in _steps(job, simulated, work, criterion, most):
+        for chosen, estimate, where in _steps(job, simulated, work, criterion, most):
+            count = len(chosen)
             if count == options.views:
+                choices.append(chosen)
                 random = np.random.default_rng([options.seed, 8, job.number])
                 errors, _ = touched(random, simulated, estimate, work, options.touches)
                 means[criterion] = MM_PER_M * float(errors.mean())
@@ -342,6 +355,8 @@ def _planned(job: _Job, kind: ErrorKind, result: CellResult) -> CellResult:
     random = np.random.default_rng([options.seed, 8, job.number])
     errors, _ = touched(random, simulated, whole, work, options.touches)
     pool_mm = MM_PER_M * float(errors.mean())
+    foretold = by_hindsight(whole, everything, work, choices, START)
+    by_entropy, by_touch = foretold.of_choices
     kept, views = float("nan"), 0
     if stopped is not None:
         random = np.random.default_rng([options.seed, 9, job.number])
@@ -352,6 +367,7 @@ def _planned(job: _Job, kind: ErrorKind, result: CellResult) -> CellResult:
         entropy_mm=means["entropy"],
         touch_mm=means["touch"],
         pool_mm=pool_mm,
+        choices_mm=(MM_PER_M * by_entropy, MM_PER_M * by_touch, MM_PER_M * foretold.best),
         asked_held=kept,
         asked_met=stopped is not None,
         asked_views=views,
@@ -360,8 +376,8 @@ def _planned(job: _Job, kind: ErrorKind, result: CellResult) -> CellResult:
 
 def _steps(
     job: _Job, cell: SimulatedCell, work: Work, criterion: str, most: int
-) -> Iterator[tuple[int, Estimate, float | None]]:
-    """Yield views, estimate and worst touch error (metres; None while open) as views are added."""
+) -> Iterator[tuple[list[int], Estimate, float | None]]:
+    """Yield the views chosen, estimate and worst touch error (metres; None while open) as views are added."""
     everything = Measurements.of_recording(cell.recording)
     estimator = make_estimator(ModelName.AUTO, _arm(job.group))
     chosen = list(range(START))
@@ -373,7 +389,7 @@ def _steps(
         worst = None
         if criterion == "touch" and len(chosen) >= FEWEST_VIEWS and estimate.determined:
             worst = touch_map(estimate, taken, work).worst_m
-        yield len(chosen), estimate, worst
+        yield list(chosen), estimate, worst
         if len(chosen) >= most:
             return
         core = _core.Criterion("entropy")
