@@ -180,3 +180,29 @@ def test_a_box_that_nothing_reaches_is_refused_only_if_it_was_asked_for() -> Non
     assert calibrate(measurements, kinematics=known).touch is None
     with pytest.raises(InputError, match="expected the lower first"):
         WorkBox((0, 0, 0), (1, 0, 1))
+
+
+def test_beside_the_robot_the_tool_points_down_where_the_arm_can() -> None:
+    estimate, measurements = solved(Mounting.EYE_TO_HAND)
+    work = Work(tool_m=(0.0, 0.02, 0.15))
+    touches = lay_out(estimate, measurements, work).touches
+    along = touches.touched_from[:, :3, :3] @ (TOOL / np.linalg.norm(TOOL))
+    down = along[:, 2] < -1 + 1e-9
+    assert 0.5 < down.mean() <= 1
+    tips = touches.touched_from[:, :3, :3] @ TOOL + touches.touched_from[:, :3, 3]
+    np.testing.assert_allclose(tips, touches.points_m, atol=1e-12)
+    assert touches.touching_rad is not None
+    np.testing.assert_allclose(ARM.forward(touches.touching_rad), touches.touched_from, atol=1e-5)
+
+
+def test_an_arm_that_cannot_point_down_touches_as_it_held_the_board() -> None:
+    estimate, measurements = solved(Mounting.EYE_TO_HAND)
+    # A tool so long that for most points the flange would have to stand above what the arm reaches.
+    work = Work(tool_m=(0.0, 0.0, 0.6))
+    touches = lay_out(estimate, measurements, work).touches
+    held = [view.T_base_flange.rotation for view in measurements.views]
+    turns = touches.touched_from[:, :3, :3]
+    down = turns[:, 2, 2] < -1 + 1e-9
+    as_held = [any(np.allclose(turn, one) for one in held) for turn in turns]
+    assert 0 < down.mean() < 0.7
+    assert (down | np.array(as_held)).all()
