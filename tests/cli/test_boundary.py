@@ -183,6 +183,28 @@ def test_interrupted_process_ends_with_130(tmp_path: Path) -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 130
 
 
+WHILE_IT_STARTS = """
+class Boundary:
+    def find_spec(name, *_):
+        if "boundary" in name:
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Boundary)
+"""
+WHILE_IT_SAYS_SO = """
+import handeye.cli.boundary as b
+def interrupted(_):
+    raise KeyboardInterrupt
+b.make_app = b._complain = interrupted
+"""
+
+
+@pytest.mark.parametrize("there", [WHILE_IT_STARTS, WHILE_IT_SAYS_SO])
+def test_an_interruption_outside_the_boundary_is_one_too(there: str) -> None:
+    code = f"import sys\n{there}\nfrom handeye.cli import main\nmain()"
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True)
+    assert (done.returncode, done.stderr) == (130, b"")
+
+
 @pytest.mark.parametrize(
     ("typed", "meant"), [("slove", "solve"), ("valdate", "validate"), ("improt", "import")]
 )

@@ -41,6 +41,38 @@ def test_work_that_takes_an_hour_can_be_interrupted(work: Callable[[], None]) ->
         signal.signal(signal.SIGINT, before)
 
 
+def many_things() -> dict[str, Callable[[], object]]:
+    """Return calls that go over many things, half a second each."""
+    random = np.random.default_rng(0)
+    lens = np.array([900.0, 900, 500, 500, -0.2, 0.05, 0, 0, 0])
+    pixels = random.uniform(0, 1000, (800_000, 2))
+    places, angles = random.uniform(0, 1000, (40_000, 2)), np.tile([0.1, 1.6], (40_000, 1))
+    centres, shapes = random.uniform(0, 1e6, (16_000, 2)), np.tile(np.eye(2), (16_000, 1, 1))
+    arm, joints = open_arm("ur5e"), random.uniform(-3, 3, (800_000, 6))
+    return {
+        "unproject": lambda: _core.unproject("brown_conrady_5", lens, pixels),
+        "neighbours": lambda: _core.crossing_neighbours(places, angles, 0.3),
+        "gaps": lambda: _core.free_gaps(centres, shapes),
+        "jacobians": lambda: arm.jacobian(joints),
+    }
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals to itself")
+@pytest.mark.parametrize("name", ["unproject", "neighbours", "gaps", "jacobians"])
+def test_signals_are_heard_while_many_things_are_gone_over(name: str) -> None:
+    work, heard = many_things()[name], list[int]()
+    before = signal.signal(signal.SIGPROF, lambda *_: heard.append(1))
+    # Of processor time: how busy the machine is does not matter.
+    signal.setitimer(signal.ITIMER_PROF, 0.01, 0.01)
+    try:
+        work()
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+    # Signals that nobody hears until the end are one.
+    assert len(heard) > 2
+
+
 def test_a_panic_is_an_ordinary_exception() -> None:
     for _ in range(2):
         with pytest.raises(RuntimeError, match="the core failed: no such number"):

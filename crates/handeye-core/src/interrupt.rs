@@ -1,6 +1,6 @@
 //! Giving up a long calculation because its caller asks for it.
 //!
-//! Long loops call [`check`]. Where the caller has said how to ask ([`asking`]), and is told to stop, the calculation is
+//! Long loops call [`check`], or go over [`checked`] items. Where the caller has said how to ask ([`asking`]), and is told to stop, the calculation is
 //! unwound to there. The core itself knows neither clock nor signals.
 
 use std::cell::Cell;
@@ -36,9 +36,22 @@ pub fn check() {
     }
 }
 
+/// So many items, of a tenth of a millisecond each at most, are gone over between two checks.
+const STRIDE: usize = 64;
+
+/// The same items, with a [`check`] now and then.
+pub fn checked<I: IntoIterator>(items: I) -> impl Iterator<Item = I::Item> {
+    items.into_iter().enumerate().map(|(number, item)| {
+        if number % STRIDE == 0 {
+            check();
+        }
+        item
+    })
+}
+
 #[cfg(test)]
 mod tests {
-    use std::panic::catch_unwind;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
 
     use super::*;
 
@@ -57,5 +70,16 @@ mod tests {
         assert!(stopped.is_err_and(|with| with.is::<Interrupted>()));
         check(); // as before
         assert_eq!(asking(|| false, || (check(), 2).1), 2);
+    }
+
+    #[test]
+    fn items_are_the_same_and_gone_over_no_further_than_asked() {
+        let items = 0..3 * STRIDE;
+        assert!(checked(items.clone()).eq(items.clone()));
+        let mut seen = 0;
+        let stopped =
+            catch_unwind(AssertUnwindSafe(|| asking(|| true, || checked(items).for_each(|_| seen += 1))));
+        assert!(stopped.is_err_and(|with| with.is::<Interrupted>()));
+        assert_eq!(seen, 0);
     }
 }

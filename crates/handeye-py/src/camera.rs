@@ -2,6 +2,7 @@
 
 use crate::call::CallCore;
 use handeye_core::camera::{Camera, Feature, Lens, ParameterJacobian, Projection};
+use handeye_core::interrupt::checked;
 use handeye_core::pose;
 use nalgebra::{Matrix2x3, SVector, Vector2, Vector3};
 use numpy::{IntoPyArray, PyArray1, PyArrayDyn};
@@ -68,7 +69,7 @@ fn project<'py>(
 ) -> PyResult<(Floats<'py>, Flags<'py>)> {
     let camera = camera(py, lens, &parameters)?;
     let points = convert::vectors::<3>(py, "points_camera", &points_camera)?;
-    let pixels: Vec<_> = py.core(|| points.iter().map(|p| camera.project(p)).collect())?;
+    let pixels: Vec<_> = py.core(|| checked(&points).map(|p| camera.project(p)).collect())?;
     Ok(optional_out(py, &pixels, NAN_PIXEL))
 }
 
@@ -82,7 +83,7 @@ fn project_jacobians<'py>(
     let camera = camera(py, lens, &parameters)?;
     let points = convert::vectors::<3>(py, "points_camera", &points_camera)?;
     let projections: Vec<_> =
-        py.core(|| points.iter().map(|p| camera.project_with_derivatives(p)).collect())?;
+        py.core(|| checked(&points).map(|p| camera.project_with_derivatives(p)).collect())?;
     let unseen = Projection {
         pixel: NAN_PIXEL,
         d_point: Matrix2x3::repeat(f64::NAN),
@@ -110,7 +111,7 @@ fn unproject<'py>(
 ) -> PyResult<(Floats<'py>, Flags<'py>)> {
     let camera = camera(py, lens, &parameters)?;
     let pixels = convert::vectors::<2>(py, "uv", &uv)?;
-    let rays: Vec<_> = py.core(|| pixels.iter().map(|p| camera.unproject(p)).collect())?;
+    let rays: Vec<_> = py.core(|| checked(&pixels).map(|p| camera.unproject(p)).collect())?;
     Ok(optional_out(py, &rays, Vector3::repeat(f64::NAN)))
 }
 
@@ -127,7 +128,7 @@ fn project_features<'py>(
     let camera = camera(py, lens, &parameters)?;
     let transform = convert::transform(py, "T_camera_target", &T_camera_target)?;
     let features = features(py, &points, &radii)?;
-    let pixels: Vec<_> = py.core(|| features.iter().map(|f| camera.observe(&transform, f)).collect())?;
+    let pixels: Vec<_> = py.core(|| checked(&features).map(|f| camera.observe(&transform, f)).collect())?;
     Ok(optional_out(py, &pixels, NAN_PIXEL))
 }
 

@@ -1,6 +1,7 @@
 //! The group of rigid transforms, batched.
 
 use crate::call::CallCore;
+use handeye_core::interrupt::checked;
 use handeye_core::se3::Se3;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -18,7 +19,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyfunction]
 fn se3_exp<'py>(py: Python<'py>, xi: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let twists = convert::vectors::<6>(py, "xi", &xi)?;
-    let transforms: Vec<Se3> = py.core(|| twists.iter().map(Se3::exp).collect())?;
+    let transforms: Vec<Se3> = py.core(|| checked(&twists).map(Se3::exp).collect())?;
     Ok(convert::transforms_out(py, &transforms))
 }
 
@@ -26,7 +27,7 @@ fn se3_exp<'py>(py: Python<'py>, xi: Array<'py>) -> PyResult<Bound<'py, PyArrayD
 #[expect(non_snake_case, reason = "the name in Python")]
 fn se3_log<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let transforms = convert::transforms(py, "T", &T)?;
-    let twists: Vec<_> = py.core(|| transforms.iter().map(Se3::log).collect())?;
+    let twists: Vec<_> = py.core(|| checked(&transforms).map(Se3::log).collect())?;
     Ok(convert::vectors_out(py, &twists))
 }
 
@@ -34,7 +35,7 @@ fn se3_log<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDy
 #[expect(non_snake_case, reason = "the name in Python")]
 fn se3_adjoint<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let transforms = convert::transforms(py, "T", &T)?;
-    let adjoints: Vec<_> = py.core(|| transforms.iter().map(Se3::adjoint).collect())?;
+    let adjoints: Vec<_> = py.core(|| checked(&transforms).map(Se3::adjoint).collect())?;
     Ok(convert::matrices_out(py, &adjoints))
 }
 

@@ -6,6 +6,7 @@ use handeye_core::imaging::Picture;
 use handeye_core::imaging::corner::{Corner, CornerFitter, CornerGuess, CornerKind};
 use handeye_core::imaging::neighbours::{Crossing, neighbours};
 use handeye_core::imaging::spot::{Spot, area_centroid, free_gaps as core_free_gaps};
+use handeye_core::interrupt::checked;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -90,7 +91,7 @@ fn fit_corners<'py>(
     });
     let found: Vec<Option<Corner>> = py.core(|| {
         let mut fitter = CornerFitter::new(picture, kind);
-        guesses.map(|guess| fitter.fit(&guess, rough)).collect()
+        checked(guesses).map(|guess| fitter.fit(&guess, rough)).collect()
     })?;
     let place = |c: &Option<Corner>| c.map_or([f64::NAN; 2], |c| c.place);
     let spread = |c: &Option<Corner>| c.map_or([[f64::NAN; 2]; 2], |c| c.spread).into_iter().flatten();
@@ -140,7 +141,7 @@ fn area_centroids<'py>(
     same_length(py, &[n, shapes.len(), gaps.len()])?;
     let picture = picture(py, &image)?;
     let found: Vec<Option<Spot>> = py.core(|| {
-        (0..n)
+        checked(0..n)
             .map(|i| area_centroid(&picture, &Spot { centre: centres[i], shape: shapes[i] }, gaps[i]))
             .collect()
     })?;
@@ -165,5 +166,6 @@ fn free_gaps<'py>(
     same_length(py, &[centres.len(), shapes.len()])?;
     let spots: Vec<_> =
         centres.into_iter().zip(shapes).map(|(centre, shape)| Spot { centre, shape }).collect();
-    Ok(convert::array(py, &[spots.len()], core_free_gaps(&spots)))
+    let gaps = py.core(|| core_free_gaps(&spots))?;
+    Ok(convert::array(py, &[spots.len()], gaps))
 }

@@ -12,13 +12,13 @@ from typing import Any
 
 from cyclopts import CycloptsError
 
+from handeye.cli import INTERRUPTED
 from handeye.cli.answer import Answer, json_text
 from handeye.cli.app import COMMANDS, make_app
 from handeye.cli.failures import UnexpectedError, UsageError, WarnedError
 from handeye.codes import advice
 from handeye.errors import ExitCode, HandeyeError, InputError, OutputError, UnstatedError
 
-INTERRUPTED = int(ExitCode.INTERRUPTED)
 REPORT = (
     "This is a mistake in handeye. Please report it with the command, what --debug prints, and the version."
 )

@@ -1,6 +1,7 @@
 //! Which crossings of edges neighbour which on a chessboard.
 
 use super::single;
+use crate::interrupt::checked;
 
 /// A place where two edges cross.
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +20,8 @@ pub fn neighbours(crossings: &[Crossing], off: f64) -> Vec<[Option<usize>; 4]> {
     let all: Vec<Turned> = crossings.iter().map(Turned::of).collect();
     let (sine, cosine) = off.sin_cos();
     let (sine, cosine) = (single(sine), single(cosine));
-    let nearest: Vec<[Option<usize>; 4]> = all.iter().map(|here| here.nearest(&all, sine, cosine)).collect();
+    let nearest: Vec<[Option<usize>; 4]> =
+        checked(&all).map(|here| here.nearest(&all, sine, cosine)).collect();
     let takes = |from: usize, to: usize| nearest[from].contains(&Some(to));
     nearest.iter().enumerate().map(|(from, rays)| rays.map(|ray| ray.filter(|&to| takes(to, from)))).collect()
 }

@@ -8,6 +8,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::spot_sums::{Bounds, Levels, Moments, Ring};
 use super::{Picture, nearest};
+use crate::interrupt::checked;
 use crate::simd::VectorUnit;
 
 /// Half the width of the band around the edge in which pixels are partly covered: the pixel itself, and blur.
@@ -45,7 +46,7 @@ pub fn free_gaps(spots: &[Spot]) -> Vec<f64> {
     let inverses: Vec<_> = spots.iter().map(|s| s.shape.try_inverse().unwrap_or_default()).collect();
     let longest: Vec<_> = spots.iter().map(|s| half_axes(&s.shape).map_or(0.0, |axes| axes[1])).collect();
     let to_edge = |inverse: &Matrix2<f64>, along: &Vector2<f64>| 1.0 / along.dot(&(inverse * along)).sqrt();
-    (0..spots.len())
+    checked(0..spots.len())
         .map(|i| {
             let mut gap = f64::INFINITY;
             for k in (0..spots.len()).filter(|k| *k != i) {

@@ -6,6 +6,7 @@ use nalgebra::Vector6;
 
 use super::chain::{Chain, JointKind, MAX_JOINTS};
 use crate::error::Error;
+use crate::interrupt::checked;
 use crate::se3::Se3;
 use crate::simd::{Kernel, LARGEST_ANGLE, MAX_LANES, Simd, Vector, VectorUnit, dispatch, sin_cos};
 
@@ -46,7 +47,7 @@ impl Chain {
             dispatch(unit, Forward { chain: self, q, poses });
             return Ok(());
         }
-        for (q, pose) in q.chunks_exact(self.len()).zip(poses.chunks_exact_mut(MATRIX)) {
+        for (q, pose) in checked(q.chunks_exact(self.len()).zip(poses.chunks_exact_mut(MATRIX))) {
             write_pose(&self.forward(q), pose);
         }
         Ok(())
@@ -65,7 +66,7 @@ impl Chain {
                 jacobians.len()
             )));
         }
-        for (q, out) in q.chunks_exact(n).zip(jacobians.chunks_exact_mut(6 * n)) {
+        for (q, out) in checked(q.chunks_exact(n).zip(jacobians.chunks_exact_mut(6 * n))) {
             let (_, columns) = match frame {
                 Frame::Base => self.base_jacobian(q),
                 Frame::Flange => self.flange_jacobian(q),
@@ -90,7 +91,7 @@ impl Chain {
         if frames.len() != count * each {
             return Err(Error::invalid(format!("{} entries for {count} times {each}", frames.len())));
         }
-        for (q, out) in q.chunks_exact(self.len()).zip(frames.chunks_exact_mut(each)) {
+        for (q, out) in checked(q.chunks_exact(self.len()).zip(frames.chunks_exact_mut(each))) {
             let (flange, moved) = self.moved(q);
             let base = Se3::identity();
             let all = [&base].into_iter().chain(&moved[..self.len()]).chain([&flange]);
@@ -119,7 +120,7 @@ impl Chain {
         if m == 0 {
             return Ok(());
         }
-        for (q, out) in q.chunks_exact(self.len()).zip(out.chunks_exact_mut(6 * m)) {
+        for (q, out) in checked(q.chunks_exact(self.len()).zip(out.chunks_exact_mut(6 * m))) {
             let (flange, places) = self.places(q);
             let back = match frame {
                 Frame::Base => Se3::identity(),
@@ -179,7 +180,7 @@ impl Kernel for Forward<'_> {
         let zero = simd.splat(0.0);
         let mut angles = [0.0; MAX_LANES];
         let mut cells = [[0.0; MAX_LANES]; 12];
-        for (q, poses) in self.q.chunks(n * lanes).zip(self.poses.chunks_mut(MATRIX * lanes)) {
+        for (q, poses) in checked(self.q.chunks(n * lanes).zip(self.poses.chunks_mut(MATRIX * lanes))) {
             let here = q.len() / n;
             let mut turns = [(zero, zero); MAX_JOINTS];
             for (i, turn) in turns.iter_mut().take(n).enumerate() {

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::error::Error;
+use crate::interrupt::checked;
 
 /// Two capsules: the ends of each among the points of a posture, and the sum of their radii.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,8 +31,7 @@ pub fn least_gaps(
     if per_posture == 0 || !points.len().is_multiple_of(per_posture) || !pairs.iter().all(known) {
         return Err(Error::invalid(format!("{} points of postures of {per_posture}", points.len())));
     }
-    Ok(points
-        .chunks_exact(per_posture)
+    Ok(checked(points.chunks_exact(per_posture))
         .map(|at| {
             pairs.iter().fold(f64::INFINITY, |least, CapsulePair { one, other, radii }| {
                 least.min(segment_distance(at[one[0]], at[one[1]], at[other[0]], at[other[1]]) - radii)
