@@ -165,6 +165,10 @@ MUTANTS = (
 
 KINEMATICS = "crates/handeye-core/src/kinematics"
 ESTIMATION = "crates/handeye-core/src/estimation"
+SQUARES = "crates/handeye-core/src/least_squares"
+POSTERIOR, MIXED, AGREEMENT = (f"{ESTIMATION}/{name}.rs" for name in ("posterior", "mixed", "agreement"))
+CANDIDATE = "crates/handeye-core/src/information/candidate.rs"
+POSE, INTERRUPT = (f"crates/handeye-core/src/{name}.rs" for name in ("pose", "interrupt"))
 CHAIN, INVERSE, BATCH = (f"{KINEMATICS}/{name}.rs" for name in ("chain", "inverse", "batch"))
 RUST = (
     Mutant("core: upper limits", CHAIN, "(j.lower..=j.upper).contains(q)", "*q >= j.lower", "kinematics"),
@@ -177,8 +181,35 @@ RUST = (
     Mutant("core: answers that turn", INVERSE, "off_rad <= options.tolerance_rad", "off_rad <= 1e5 * options.tolerance_rad", "kinematics"),
     Mutant("core: pixels of the same pictures count once", f"{ESTIMATION}/linearisation.rs", "if cell.cameras[m.camera].from_these_pixels {", "if false && cell.cameras[m.camera].from_these_pixels {", "estimation"),
     Mutant("core: pixel noise of a view", f"{ESTIMATION}/linearisation.rs", "&(m.pose.covariance * m.variance_px2)", "&m.pose.covariance", "estimation"),
-    Mutant("core: stops where it is told", "crates/handeye-core/src/interrupt.rs", "if ASK.get().is_some_and(|ask| ask()) {", "if false {", "interrupt"),
-    Mutant("core: asks nobody afterwards", "crates/handeye-core/src/interrupt.rs", "ASK.set(self.0);", "let _ = self.0;", "interrupt"),
+    Mutant("core: stops where it is told", INTERRUPT, "if ASK.get().is_some_and(|ask| ask()) {", "if false {", "interrupt"),
+    Mutant("core: asks nobody afterwards", INTERRUPT, "ASK.set(self.0);", "let _ = self.0;", "interrupt"),
+    Mutant("core: checks between many things", INTERRUPT, "if number % STRIDE == 0 {", "if false {", "interrupt"),
+    Mutant("core: what levels explain by chance", MIXED, "constant += factor.log_determinant() - right.dot(&theta);", "constant -= right.dot(&theta);", "estimation"),
+    Mutant("core: noise costs what it widens", MIXED, "        constant += log_determinant;\n        dispatch(self.unit, Accumulate", "        let _ = log_determinant;\n        dispatch(self.unit, Accumulate", "estimation"),
+    Mutant("core: constants cost what they widen", MIXED, "let mut constant = 2.0 * p.count as f64 * s.ln();", "let mut constant = 0.0;", "estimation"),
+    Mutant("core: prior of the levels", MIXED, "            value += penalty;\n            slope[i] = first;\n            curvature[(i, i)] = second;", "            let _ = (penalty, first, second);", "estimation"),
+    Mutant("core: inflation of a camera's covariance", MIXED, "view += m * weight;", "view += m;", "estimation"),
+    Mutant("core: mean of a prior", MIXED, "view += pull;", "let _ = (&mut view, pull);", "estimation"),
+    Mutant("core: recurring errors at a further station", MIXED, ".filter(|(p, _)| p.recurring)", ".filter(|(p, _)| !p.recurring)", "estimation"),
+    Mutant("core: a camera that is taken at its word", f"{ESTIMATION}/components/camera.rs", "if self.prior.inflated { 0.5 } else { 1e-3 }", "0.5", "estimation"),
+    Mutant("core: shares of the nodes", POSTERIOR, "logs.push(mode.value - answer.value - density);", "logs.push(-density);", "estimation"),
+    Mutant("core: density of the nodes", POSTERIOR, "logs.push(mode.value - answer.value - density);", "logs.push(mode.value - answer.value);", "estimation"),
+    Mutant("core: answers of the nodes differ", POSTERIOR, "covariance.ger(node.weight, &away, &away, 1.0);", "let _ = away;", "estimation"),
+    Mutant("core: degrees of freedom", f"{ESTIMATION}/degrees_of_freedom.rs", "(2.0 * total / spread", "(8.0 * total / spread", "estimation"),
+    Mutant("core: fewest degrees of freedom", f"{ESTIMATION}/degrees_of_freedom.rs", "FREEDOM: f64 = 4.5", "FREEDOM: f64 = 1.0", "estimation"),
+    Mutant("core: mean of the weak prior", f"{ESTIMATION}/weak_prior.rs", "(self.x_translation_m - x.translation)", "self.x_translation_m", "estimation"),
+    Mutant("core: a station is no witness of itself", AGREEMENT, "(&noise - &spread).cholesky()?", "(&noise + &spread).cholesky()?", "estimation"),
+    Mutant("core: nodes without the station", AGREEMENT, "node.log_weight - if inside { density } else { 0.0 }", "node.log_weight", "estimation"),
+    Mutant("core: what others say is not exact", AGREEMENT, "(mean, noise + spread)", "(mean, noise)", "estimation"),
+    Mutant("core: gate of the right chi-square", AGREEMENT, "for i in 1..degrees / 2 {", "for i in 1..degrees {", "estimation"),
+    Mutant("core: evidence of a set counts its levels", AGREEMENT, "log_evidence: -mode.value - 0.5 * spread", "log_evidence: -mode.value", "estimation"),
+    Mutant("core: noise of the pixels", f"{SQUARES}/accumulate.rs", "let of_view = 1.0 / (sigma * sigma);", "let of_view = 1.0 / sigma;", "least_squares"),
+    Mutant("core: weights of the points", f"{SQUARES}/accumulate.rs", "let weight = of_view * relative;", "let weight = of_view;", ""),
+    Mutant("core: an arm that errs, in each view", f"{SQUARES}/marginal.rs", "let h = Matrix6::identity() + ", "let h = Matrix6::identity() * 2.0 + ", "least_squares"),
+    Mutant("core: fewest views", f"{SQUARES}/problem.rs", "pub const MIN_VIEWS: usize = 3;", "pub const MIN_VIEWS: usize = 2;", "least_squares"),
+    Mutant("core: what is singular has no covariance", f"{SQUARES}/report.rs", "inverse.as_slice().iter().all(|x| x.is_finite()).then_some(inverse)", "Some(inverse)", "least_squares"),
+    Mutant("core: poses that pixels leave open", POSE, "            determined(&sums.information)?;\n            let", "            let", "pose"),
+    Mutant("core: margin of the picture", CANDIDATE, "pixel.x <= width - 1.0 - margin", "pixel.x <= width - 1.0", "information"),
     Mutant("core: other postures", INVERSE, "const DISTINCT: f64 = 1e-3;", "const DISTINCT: f64 = 10.0;", "kinematics"),
 )
 
@@ -204,9 +235,15 @@ def copied(root: Path) -> None:
 def fails(root: Path, mutant: Mutant, *, rust: bool) -> bool:
     """Tell whether the tests of a mutant fail."""
     if rust:
-        command = ["cargo", "test", "--quiet", "--locked", "-p", "handeye-core", mutant.tests]
+        command = ["cargo", "test", "--quiet", "--locked", "-p", "handeye-core", "--lib"]
         # What all mutants share is compiled once.
         environment = dict(os.environ) | {"CARGO_TARGET_DIR": str(ROOT / "target" / "mutants")}
+        built = subprocess.run(
+            [*command, "--no-run"], cwd=root, env=environment, capture_output=True, check=False
+        )
+        if built.returncode != 0:
+            raise RuntimeError(built.stderr.decode()[-2000:])
+        command += [mutant.tests]
     else:
         test, _, name = mutant.tests.partition("::")
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", f"tests/{test}"]
