@@ -2,8 +2,9 @@
 
 .venv/bin/python tools/interrupt_commands.py --times 3
 
-Of each command: after so many shares of its undisturbed time (at most `--seconds`). Right is exit code 130
-(or an end just before), within half a second; a run on a driver that hangs, and the page, are among them.
+Of each command: at so many instants between its start and `--seconds`. Right is exit code 130 (or an end just
+before), within half a second; a run on a driver that hangs, and the page, are among them. Before a line of
+handeye is run, and after the last, Python itself ends of the signal, which shells call 130 too.
 """
 
 import argparse
@@ -25,7 +26,9 @@ from folders import made_recording, photographed, written
 from handeye.errors import ExitCode
 
 HANDEYE = (sys.executable, "-c", "from handeye.cli import main; main()")
-SOONEST_S, ENOUGH_S = 0.3, 0.5
+SOONEST_S, ENOUGH_S = 0.02, 0.5
+# A command line that is refused has not been interrupted.
+RIGHT = {0, ExitCode.INTERRUPTED, -signal.SIGINT}
 
 
 def commands(folder: Path) -> dict[str, tuple[str, ...]]:
@@ -119,8 +122,7 @@ def main() -> int:
             codes.append(code)
             if seconds >= worst:
                 worst, words = seconds, said
-        # A command line that is refused has not been interrupted.
-        wrong = worst > ENOUGH_S or any(code not in {0, ExitCode.INTERRUPTED} for code in codes)
+        wrong = worst > ENOUGH_S or not RIGHT.issuperset(codes)
         late += wrong
         print(
             f"{'LATE' if wrong else 'ok':<5}{name:<24} {worst:.2f} s, exit {codes} | {words[:160]}",
