@@ -61,6 +61,7 @@ MUTANTS = (
     Mutant("tool takes part", SAFETY, "return Body(arm, workspace, mounted_points(believed), solids)", "return Body(arm, workspace, solids=solids)", T_SAFETY),
     Mutant("what is mounted with several cameras takes part", SAFETY, "return Body(arm, workspace, mounted_on_flange(believed), solids)", "return Body(arm, workspace, solids=solids)", T_RIG),
     Mutant("an arm goes back where its tool has no room", "session/rig_choosing.py", "            if joints is not None:\n", "            if False:\n", T_RIG),
+    Mutant("a wrong station keeps no rig from its answer", "session/rig.py", "(estimate is None or not all_agree(", "(estimate is not None and not all_agree(", T_RIG + "::wrong_station"),
     Mutant("a rig's turns go on to the next axis", "session/rig_choosing.py", "if whole or tries == 2:", "if whole:", T_RIG),
     Mutant("check before sending", ATTEMPT, "    if why is not None:\n        return Missed(Failure.MOTION_REFUSED", "    if False:\n        return Missed(Failure.MOTION_REFUSED", T_SAFETY),
     Mutant("a dry run moves nothing", "cli/run.py", "if dry_run or session is None:", "if session is None:", "end_to_end/test_run.py"),

@@ -136,6 +136,46 @@ def test_a_robot_that_never_goes_ends_the_run(tmp_path: Path) -> None:
     assert (end.stations, end.calibration) == (0, None)
 
 
+class Astray:
+    """A robot that stands centimetres from where it says, at one station."""
+
+    def __init__(self, robot: Robot, station: str, seed: int) -> None:
+        self.robot, self.station, self.said = robot, station, None
+        self.way = np.random.default_rng([seed, 77]).choice([-1, 1], 6)
+
+    def move_to(self, goal: Goal) -> None:
+        self.said: Reading | None = None
+        if goal.label.startswith(self.station) and goal.joints_rad is not None:
+            self.said = Reading(goal.T_base_flange, goal.joints_rad)
+            off = np.array(goal.joints_rad) + 0.03 * self.way
+            goal = Goal(goal.label, goal.T_base_flange, tuple(off.tolist()), goal.speed_rad_s)
+        self.robot.move_to(goal)
+
+    def read_pose(self) -> Reading:
+        return self.said or self.robot.read_pose()
+
+    def stop(self) -> None:
+        self.robot.stop()
+
+
+@pytest.mark.parametrize(("seed", "station"), [(70002, "station_01"), (70018, "station_02")])
+def test_one_wrong_station_among_the_first_does_not_hold_up_the_others(
+    tmp_path: Path, seed: int, station: str
+) -> None:
+    asked = replace(RIG, seed=seed)
+    prepared = rig_cell(asked)
+    astray = replace(prepared.cell, robot=Astray(prepared.cell.robot, station, seed))
+    prepared = replace(prepared, cell=astray)
+    session, store = begin_rig(prepared, tmp_path / "s")
+    end = session.run()
+    store.close()
+    assert end.reason is EndReason.VIEWS_TAKEN
+    run = judged(prepared, end)
+    assert max(run.error_mm.values()) < 5
+    assert end.calibration is not None
+    assert any(station in finding.sentence for finding in end.calibration.diagnosis)
+
+
 class Watched:
     """A robot that remembers where it was sent."""
 

@@ -88,8 +88,9 @@ class RigSession(Stepping[RigSituation, RigEnd]):
     def _believed(self) -> RigEstimate | None:
         """Return what is believed; None while the stations do not determine every camera.
 
-        One wrong view would make all the others look uncertain. Mistakes are looked for only where a view
-        stands out: the end of the session looks for them in any case.
+        One wrong view would make all the others look uncertain, or keep them from saying anything at all.
+        Mistakes are looked for only where a view stands out or nothing is determined: the end of the session
+        looks for them in any case.
         """
         recording = self._store.recording
         if not recording.stations:
@@ -97,14 +98,12 @@ class RigSession(Stepping[RigSituation, RigEnd]):
         self._measured = RigMeasurements.of(recording, self._measured)
         measurements = agree_on_labels(self._measured)
         estimate = self._estimated(measurements)
-        if estimate is None:
-            return None
         doubtful = [
             (pair, measured)
             for pair, measured in measurements.pairs.items()
             if len(measured) >= FEWEST_EXAMINED
             and measurements.moves(*pair)
-            and not all_agree(measured, estimate.of_pair(*pair))
+            and (estimate is None or not all_agree(measured, estimate.of_pair(*pair)))
         ]
         try:
             cleared = {pair: examine(measured).measurements for pair, measured in doubtful}
