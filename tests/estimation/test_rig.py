@@ -7,10 +7,11 @@ import pytest
 
 from handeye.errors import DegenerateError, InputError
 from handeye.estimation import RigMeasurements, estimate_rig, solve, solve_rig
+from handeye.estimation.rig_checks import examine_rig
 from handeye.robots import ArmKinematics, open_arm
 from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.simulation.rigs import RigOptions, simulate_rig
-from handeye.types import CameraView, Chessboard, Mounting, RigRecording, Station
+from handeye.types import CameraView, Chessboard, Mounting, Pose, RigRecording, Station
 from handeye.validation import metrics
 
 KNOWN = ArmKinematics(open_arm("ur5e"))
@@ -30,6 +31,34 @@ def only(recording: RigRecording, *pairs: tuple[str, str]) -> RigRecording:
         stations=tuple(stations),
         truth=None,
     )
+
+
+def displaced(station: Station, by: Pose) -> Station:
+    """Return a station at which the arm says that it stands elsewhere."""
+    return Station(
+        tuple(
+            replace(one, view=replace(one.view, T_base_flange=by @ one.view.T_base_flange))
+            for one in station.views
+        )
+    )
+
+
+def test_few_views_of_a_station_that_others_leave_out_are_left_out_too() -> None:
+    recording = replace(simulate_rig(ErrorKind.PIXEL_ONLY, 0, seed=3), truth=None)
+    by = Pose.exp([0.1, -0.06, 0.05, 0.2, 0.3, 0.1])
+    camera, target = recording.stations[0].views[0].camera, recording.stations[0].views[0].target
+    stations, seen = [displaced(recording.stations[0], by)], 1
+    for station in recording.stations[1:]:
+        own = [one for one in station.views if (one.camera, one.target) == (camera, target)]
+        others = [one for one in station.views if one not in own]
+        seen += bool(own)
+        kept = (*others, *own) if seen <= 3 else tuple(others)
+        stations += [Station(kept)] if kept else []
+    found = examine_rig(RigMeasurements.of(replace(recording, stations=tuple(stations))))
+    name = stations[0].name
+    few = found[camera, target].measurements
+    assert len(few) == 2
+    assert "elsewhere" in few.rejected[name]
 
 
 @pytest.mark.parametrize("mounting", list(Mounting))

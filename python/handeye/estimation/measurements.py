@@ -1,6 +1,6 @@
 """Views as the core takes them: flat arrays, the robot's motions, and the pose of the target in each view."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -142,6 +142,12 @@ class Measurements:
         return replace(
             self, views=tuple(self.views[i] for i in indices), poses=tuple(self.poses[i] for i in indices)
         )
+
+    def without(self, names: Collection[str], why: str) -> "Measurements":
+        """Return the measurements without some views, and why they are rejected."""
+        kept = self.select([k for k, view in enumerate(self.views) if view.name not in names])
+        gone = {view.name: why for view in self.views if view.name in names}
+        return replace(kept, rejected={**self.rejected, **gone})
 
     def with_camera(self, camera: Camera) -> "Measurements":
         """Return the measurements as seen through a camera close to this one; poses stay as they are."""

@@ -1,8 +1,12 @@
 """What is asked of a rig before it is estimated: whether all is tied to the arm, and mistakes in views."""
 
+from collections import Counter
+from collections.abc import Iterable
+
 from handeye.codes import Code
 from handeye.errors import HandeyeError, InputError
 from handeye.estimation.faults import Examination, examine
+from handeye.estimation.measurements import Measurements
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
 from handeye.types.rig import Body
 
@@ -58,21 +62,65 @@ def check_tied(measurements: RigMeasurements) -> None:
 def examine_rig(measurements: RigMeasurements) -> dict[Pair, Examination]:
     """Look for mistakes in what each camera saw of each target that the arm moves against it.
 
+    Few views of a pair cannot tell which of them is wrong. Where they contradict one another, those of
+    stations are left out at which the arm stood elsewhere by what several other pairs say.
+
     Raises
     ------
     InputError
         All views of a pair share a mistake; the message names the camera.
     """
     found: dict[Pair, Examination] = {}
-    for (camera, target), measured in measurements.pairs.items():
-        if not measurements.moves(camera, target) or len(measured) < FEWEST_STATIONS:
-            found[camera, target] = Examination(measured)
+    failed: dict[Pair, HandeyeError] = {}
+    for pair, measured in measurements.pairs.items():
+        if not measurements.moves(*pair) or len(measured) < FEWEST_STATIONS:
+            found[pair] = Examination(measured)
             continue
         try:
-            found[camera, target] = examine(measured)
+            found[pair] = examine(measured)
         except HandeyeError as error:
-            if len(measurements.pairs) == 1:
-                raise
-            where = f"camera {camera}, target {target}"
-            raise type(error)(f"{where}: {error.message}", code=error.code, hint=error.hint) from error
-    return found
+            failed[pair] = error
+    if failed:
+        left_out = astray((measurements.pairs[pair], one.measurements) for pair, one in found.items())
+        for pair, error in failed.items():
+            found[pair] = _without(left_out, measurements, pair, error)
+    return {pair: found[pair] for pair in measurements.pairs}
+
+
+def astray(examined: Iterable[tuple[Measurements, Measurements]]) -> frozenset[str]:
+    """Return stations whose views were left out of several pairs: there the arm stood elsewhere.
+
+    Parameters
+    ----------
+    examined
+        Of every pair what was measured, and what is left of it.
+
+    Examples
+    --------
+    >>> some, two = measurements.select([0, 1]), measurements.select([1])
+    >>> astray([(some, two), (some, two)]) == {some.views[0].name}
+    True
+    """
+    left_out = Counter(
+        name
+        for measured, left in examined
+        for name in {view.name for view in measured.views} - {view.name for view in left.views}
+    )
+    return frozenset(name for name, pairs in left_out.items() if pairs > 1)
+
+
+def _without(
+    left_out: frozenset[str], measurements: RigMeasurements, pair: Pair, error: HandeyeError
+) -> Examination:
+    """Examine a pair whose views contradict one another without some stations."""
+    measured = measurements.pairs[pair]
+    rest = measured.without(left_out, "the arm stood elsewhere, as other cameras saw")
+    try:
+        if len(rest) == len(measured):
+            raise error
+        return examine(rest) if len(rest) >= FEWEST_STATIONS else Examination(rest)
+    except HandeyeError as failure:
+        if len(measurements.pairs) == 1:
+            raise
+        where = f"camera {pair[0]}, target {pair[1]}"
+        raise type(failure)(f"{where}: {failure.message}", code=failure.code, hint=failure.hint) from failure

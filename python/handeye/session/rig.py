@@ -3,13 +3,13 @@
 Journal, lock, checks before and after every motion, and going on after a break are those of one camera.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from handeye.codes import Code
 from handeye.errors import DegenerateError, InputError, SolveError
 from handeye.estimation import RigCalibration, RigEstimate, RigMeasurements, estimate_rig, solve_rig
 from handeye.estimation.faults import examine
-from handeye.estimation.rig_checks import check_tied
+from handeye.estimation.rig_checks import astray, check_tied
 from handeye.estimation.rig_labels import agree_on_labels
 from handeye.session.attempt import Cell
 from handeye.session.deciding import FAILED, EndReason, Halt
@@ -111,7 +111,13 @@ class RigSession(Stepping[RigSituation, RigEnd]):
             return estimate  # Shared by all of them; said at the end.
         if all(len(cleared[pair]) == len(measured) for pair, measured in doubtful):
             return estimate
-        return self._estimated(measurements.with_pairs(cleared))
+        left_out = astray((measured, cleared[pair]) for pair, measured in doubtful)
+        kept = {
+            pair: measured.without(left_out, "the arm stood elsewhere")
+            for pair, measured in {**measurements.pairs, **cleared}.items()
+        }
+        kept = {pair: measured for pair, measured in kept.items() if len(measured) > 0}
+        return self._estimated(replace(measurements, pairs=kept))
 
     def _estimated(self, measurements: RigMeasurements) -> RigEstimate | None:
         try:
