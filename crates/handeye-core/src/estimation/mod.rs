@@ -36,6 +36,8 @@ mod twists;
 mod weak_prior;
 
 #[cfg(test)]
+mod statistics_tests;
+#[cfg(test)]
 mod tests;
 
 pub use agreement::{Agreement, SetFit};

@@ -11,10 +11,10 @@ use crate::testing::Random;
 
 const PIXELS: f64 = 1e-4;
 
-struct Truth {
-    cell: Cell,
-    x: Vec<Se3>,
-    y: Vec<Se3>,
+pub(super) struct Truth {
+    pub cell: Cell,
+    pub x: Vec<Se3>,
+    pub y: Vec<Se3>,
 }
 
 fn assumptions(described: bool) -> Assumptions {
@@ -28,7 +28,13 @@ fn assumptions(described: bool) -> Assumptions {
 }
 
 /// A cell whose poses are exact but for noise of the pixels and, new at every station, twists of the flange.
-fn made(seed: u64, bodies: (&[Body], &[Body]), stations: usize, flange: f64, described: bool) -> Truth {
+pub(super) fn made(
+    seed: u64,
+    bodies: (&[Body], &[Body]),
+    stations: usize,
+    flange: f64,
+    described: bool,
+) -> Truth {
     let random = &mut Random::new(seed);
     let x: Vec<Se3> = bodies.0.iter().map(|_| random.transform(0.3, 1.5)).collect();
     let y: Vec<Se3> = bodies.1.iter().map(|_| random.transform(0.5, 1.5)).collect();
@@ -90,7 +96,7 @@ fn made(seed: u64, bodies: (&[Body], &[Body]), stations: usize, flange: f64, des
     Truth { cell, x, y }
 }
 
-fn options(described: bool) -> Options {
+pub(super) fn options(described: bool) -> Options {
     Options {
         assumptions: assumptions(described),
         weak: WeakPrior::default(),
