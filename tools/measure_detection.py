@@ -3,8 +3,6 @@
     python tools/measure_detection.py speed
     python tools/measure_detection.py rendered --first 0 --count 200 --rows rows.csv
     python tools/measure_detection.py summary --rows rows.csv
-    python tools/measure_detection.py quality --views 8
-    python tools/measure_detection.py gamma --first 9100 --views 4
     python tools/measure_detection.py none
     python tools/measure_detection.py large
     HANDEYE_DATA=... python tools/measure_detection.py public
@@ -26,7 +24,15 @@ from handeye.cameras.render import Appearance, BoardRenderer, clutter
 from handeye.datasets import ImageSet, load
 from handeye.detection import Detection, NotFound, Prediction, calibrate_camera, detect, relabeled
 from handeye.detection.registration import printed
-from handeye.types import AprilGrid, ArucoGrid, Camera, Charuco, Chessboard, CircleGrid, Pose, Target
+from handeye.types import (
+    AprilGrid,
+    Camera,
+    Charuco,
+    Chessboard,
+    CircleGrid,
+    Pose,
+    Target,
+)
 
 WIDTH, HEIGHT = 1280, 1024
 CAMERA = Camera("brown_conrady_5", [1400, 1396, 645, 508, -0.12, 0.08, 5e-4, -4e-4, 0.0], WIDTH, HEIGHT)
@@ -175,83 +181,6 @@ def large() -> None:
         print(line, flush=True)
 
 
-GRIDS: dict[str, Target] = {"ArUco grid": ArucoGrid(5, 7, 0.03, 0.006, "DICT_5X5_100")}
-# Looks under which stated deviations are compared with errors.
-LOOKS: dict[str, dict[str, float]] = {
-    "sharp": {"blur_px": 0.4, "noise": 1.0},
-    "blurred": {"blur_px": 2.0, "noise": 1.0},
-    "noisy": {"blur_px": 0.7, "noise": 6.0},
-    "gamma 0.45": {"blur_px": 0.7, "noise": 2.0, "gamma": 0.45},
-    "gamma 2.2": {"blur_px": 0.7, "noise": 2.0, "gamma": 2.2},
-    "JPEG": {"blur_px": 0.7, "noise": 1.0, "quality": 70},
-}
-
-
-def quality(first: int, views: int) -> None:
-    """Print squared errors over stated variances, for each family and look, and median deviations."""
-    print("| target | " + " | ".join(LOOKS) + " | all |\n|---" + "|---" * (len(LOOKS) + 1) + "|")
-    for name, target in (TARGETS | GRIDS).items():
-        # Finely, as edges along the rows of pixels are otherwise drawn up to a sixteenth of a pixel off.
-        renderer = BoardRenderer(CAMERA, target, Appearance(supersampling=16))
-        cells: list[str] = []
-        everything: list[float] = []
-        drawn: dict[int, np.ndarray] = {}
-        for look in LOOKS.values():
-            ratios: list[float] = []
-            sigmas: list[float] = []
-            for view in range(first, first + views):
-                random = np.random.default_rng([23, view])
-                pose = posed(target, float(random.uniform(0.25, 0.7)), random)
-                if view not in drawn:
-                    drawn[view] = renderer.image(pose)
-                found = detect(taken(drawn[view], look, random), target)
-                if isinstance(found, NotFound) or found.sigmas_px is None:
-                    continue
-                truth = projected(target, pose)
-                squares = [
-                    ((found.pixels - truth[p[found.point_ids]]) ** 2).sum(axis=1) for p in target.symmetries
-                ]
-                ratios.extend(min(squares, key=np.sum) / 2 / found.sigmas_px**2)
-                sigmas.extend(found.sigmas_px)
-            cells.append(f"{np.mean(ratios):.2f} ({np.median(sigmas):.3f} px)")
-            everything.extend(ratios)
-        print(f"| {name} | {' | '.join(cells)} | {np.mean(everything):.2f} |", flush=True)
-
-
-def taken(image: np.ndarray, look: dict[str, float], random: np.random.Generator) -> np.ndarray:
-    """A picture out of focus, as a camera with another gamma and noise gives it, and as JPEG."""
-    grey = cv2.GaussianBlur(image.astype(np.float64), (0, 0), look["blur_px"])
-    grey = 255 * (grey / 255) ** look.get("gamma", 1.0) + random.normal(scale=look["noise"], size=grey.shape)
-    bytes_ = np.rint(grey.clip(0, 255)).astype(np.uint8)
-    if "quality" in look:
-        coded = cv2.imencode(".jpg", bytes_, [cv2.IMWRITE_JPEG_QUALITY, int(look["quality"])])[1]
-        bytes_ = np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
-    return bytes_
-
-
-def gamma(first: int, views: int) -> None:
-    """Print errors of grids of markers under gamma and blur: over all views, and of the worst of them."""
-    cells = [(value, blur) for value in (0.45, 2.2) for blur in (0.5, 1.0)]
-    print(
-        "| target | " + " | ".join(f"gamma {g}, blur {b} px" for g, b in cells) + " |\n|---|---|---|---|---|"
-    )
-    for name in ("AprilGrid", "AprilGrid, border 1", "ArUco grid"):
-        target = (TARGETS | GRIDS)[name]
-        renderer = BoardRenderer(CAMERA, target, Appearance(supersampling=16))
-        errors: dict[tuple[float, float], list[float]] = {cell: [] for cell in cells}
-        for view in range(first, first + views):
-            random = np.random.default_rng([23, view])
-            pose = posed(target, float(random.uniform(0.25, 0.7)), random)
-            image, truth = renderer.image(pose), projected(target, pose)
-            for value, blur in cells:
-                look = {"blur_px": blur, "noise": 2.0, "gamma": value}
-                found = detect(taken(image, look, random), target)
-                if isinstance(found, Detection):
-                    errors[value, blur].append(rms(target, found, truth))
-        row = [f"{np.sqrt(np.mean(np.square(e))):.3f}, at most {max(e):.3f} px" for e in errors.values()]
-        print(f"| {name} | {' | '.join(row)} |", flush=True)
-
-
 def rendered(first: int, count: int, file: Path | None) -> None:
     """Print, for some of the rendered views, what was found with and without a prediction, and how well."""
     names = list(TARGETS)
@@ -369,9 +298,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument(
-        "what", choices=("speed", "none", "large", "rendered", "summary", "quality", "gamma", "public")
-    )
+    parser.add_argument("what", choices=("speed", "none", "large", "rendered", "summary", "public"))
     parser.add_argument("--first", type=int, default=0, help="number of the first view")
     parser.add_argument("--count", type=int, default=1000, help="number of rendered views")
     parser.add_argument(
@@ -390,10 +317,6 @@ def main() -> None:
         rendered(options.first, options.count, options.rows)
     elif options.what == "summary":
         summary(options.rows)
-    elif options.what == "gamma":
-        gamma(options.first, options.views)
-    elif options.what == "quality":
-        quality(options.first, options.views)
     else:
         public(Path(os.environ["HANDEYE_DATA"]))
 
