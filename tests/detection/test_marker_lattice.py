@@ -25,6 +25,18 @@ def test_places_beside_markers_that_give_no_map_are_in_no_picture(monkeypatch: p
     np.testing.assert_array_equal(found, [False, False])
 
 
+def test_three_markers_give_no_map() -> None:
+    """OpenCV ends with an error for fewer than four; a drawn board of which three were seen had that."""
+    corners = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]]) + 15.0 * np.array(
+        [[[0, 0]], [[1, 0]], [[0, 1]]]
+    )
+    lattice = SimpleNamespace(
+        reading=SimpleNamespace(corners=corners), places=np.array([[0, 0], [1, 0], [0, 1]]), shape=(2, 2)
+    )
+    found = marker_lattice._in_picture(np.array([[1, 1]]), cast("Any", lattice), (640, 480))
+    np.testing.assert_array_equal(found, [False])
+
+
 def test_a_marker_turned_half_around_is_not_beside_another() -> None:
     """The mean of their axes is nothing; that ended the search with a singular matrix."""
     square = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]])

@@ -17,7 +17,7 @@ from handeye.types.arrays import FloatArray
 # Contrast is that between these shares of the radius, in so many directions.
 AT, RAYS = (0.6, 1.35), 8
 # Deviation of a pixel in grey values, and the width of the band along the edge in which pixels count.
-USUAL_NOISE, BAND_PX = 2.0, 3.0
+USUAL_NOISE, BAND_PX = 2.0, 5.0
 
 
 def gaps(spots: Spots) -> FloatArray:

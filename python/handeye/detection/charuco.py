@@ -13,7 +13,6 @@ from handeye.detection.base import (
     NotFound,
     Reason,
     inside,
-    ordered,
 )
 from handeye.detection.corner_fit import (
     ASTRAY_PX,
@@ -41,6 +40,7 @@ from handeye.detection.markers import (
     parameters,
 )
 from handeye.detection.noise import calmed
+from handeye.detection.quality import stated
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import Charuco
 from handeye.types.arrays import FloatArray
@@ -135,7 +135,7 @@ def _find(image: Image, target: Charuco) -> Detection | NotFound:
         good = good[away <= np.maximum(ASTRAY_PX, OFF_SHARE * pitches)]
         number = len(good)
         if number >= FEWEST_CORNERS:
-            return ordered(target, numbers[good], sharp.places[good], sharp.sigmas_px[good])
+            return stated(image, target, numbers[good], sharp.places[good], sharp.sigmas_px[good])
     return seen_markers.twice(target) or NotFound(
         Reason.INCOMPLETE,
         f"{number} of {target.point_count} corners by {len(markers)} markers; {FEWEST_CORNERS} are needed",
@@ -172,7 +172,7 @@ def confirm(image: Image, target: Charuco, board: Aligned) -> Detection | None:
     )
     if good.sum() < max(FEWEST_CORNERS, LEAST_SHARE * seen.sum()):
         return None
-    return ordered(target, ids[good], sharp.places[good], sharp.sigmas_px[good])
+    return stated(image, target, ids[good], sharp.places[good], sharp.sigmas_px[good])
 
 
 def _steps(corners: FloatArray, places: FloatArray, markers: FloatArray) -> FloatArray:

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from handeye.detection.base import Detection, Image, NotFound, Reason, inside, ordered
+from handeye.detection.base import Detection, Image, NotFound, Reason, inside
 from handeye.detection.beyond import goes_on
 from handeye.detection.corner_fit import CornerFits, CornerKind, astray, corner_fits
 from handeye.detection.diagnosis import diagnose
 from handeye.detection.markers import from_neighbours
 from handeye.detection.mesh import FEWEST, Mesh, beside, filled, meshes, steps
 from handeye.detection.part import Part
+from handeye.detection.quality import stated
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.detection.saddles import find_saddles
 from handeye.types import Chessboard
@@ -122,7 +123,7 @@ def confirm(image: Image, target: Chessboard, board: Aligned) -> Detection | Non
     fits = _fitted(image, target, places)
     if astray(fits.places, places, _edges(target, places).heights).any():
         return None
-    return ordered(target, np.arange(target.point_count), fits.places, fits.sigmas_px)
+    return stated(image, target, np.arange(target.point_count), fits.places, fits.sigmas_px)
 
 
 def _measured(image: Image, target: Chessboard, corners: FloatArray) -> Detection | NotFound:
@@ -139,7 +140,7 @@ def _measured(image: Image, target: Chessboard, corners: FloatArray) -> Detectio
         return NotFound(
             Reason.INCOMPLETE, f"only {len(good)} of {target.point_count} corners can be measured"
         )
-    return ordered(target, good, fitted[good], fits.sigmas_px[good])
+    return stated(image, target, good, fitted[good], fits.sigmas_px[good])
 
 
 def _fitted(image: Image, target: Chessboard, corners: FloatArray) -> CornerFits:

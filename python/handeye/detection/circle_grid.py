@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handeye import _core
-from handeye.detection.base import Detection, Image, NotFound, Reason, ordered
+from handeye.detection.base import Detection, Image, NotFound, Reason
 from handeye.detection.beyond import goes_on
 from handeye.detection.blobs import Spots, areas, find_spots
 from handeye.detection.centroid import area_centroids, gaps, sigmas_px
@@ -16,6 +16,7 @@ from handeye.detection.diagnosis import diagnose
 from handeye.detection.lattice import Placement, grow, placements
 from handeye.detection.markers import from_neighbours
 from handeye.detection.part import Part
+from handeye.detection.quality import stated
 from handeye.detection.registration import LEAST_LIKENESS, Aligned
 from handeye.types import CircleGrid
 from handeye.types.arrays import FloatArray, IndexArray
@@ -87,7 +88,7 @@ def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | Non
         if _marked_ratio(target, spots, found.shapes) < MARKED_RATIO:
             return None
     kept = found.take(np.flatnonzero(good))
-    return ordered(target, ids[good], kept.centres, sigmas_px(image, kept))
+    return stated(image, target, ids[good], kept.centres, sigmas_px(image, kept))
 
 
 def _fit_others(target: CircleGrid, ids: IndexArray, circles: Spots) -> NDArray[np.bool_]:
@@ -235,7 +236,7 @@ def _measured(
     if len(ids) < LEAST_MEASURED * target.point_count:
         return NotFound(Reason.INCOMPLETE, f"only {len(ids)} of {target.point_count} circles can be measured")
     kept = Spots(pixels[chosen[ids]], shapes[chosen[ids]])
-    return ordered(target, ids, kept.centres, sigmas_px(image, kept))
+    return stated(image, target, ids, kept.centres, sigmas_px(image, kept))
 
 
 def _marked_ratio(target: CircleGrid, chosen: IndexArray, shapes: FloatArray) -> float:

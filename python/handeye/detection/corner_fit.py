@@ -34,9 +34,9 @@ TOLD_SHARE = 0.02
 # Residuals of a corner are larger than those of most by this factor, and than this share of its contrast,
 # where there is something else.
 MISFIT_RATIO, MISFIT_SHARE = 1.5, 0.04
-# Residuals of a smoothed picture are like their neighbours, so that they count for less: deviations are
-# larger by this factor than independent ones would make them.
-CORRELATED = 2.0
+# Standard deviation s of the Gaussian that smooths the picture; of noise that is independent from pixel to
+# pixel it leaves 1 / (2 s sqrt(pi)).
+SMOOTHING_PX = 1.0
 
 
 class CornerKind(Enum):
@@ -147,8 +147,10 @@ class CornerFits:
         there = np.isfinite(self.misfits)
         usual = float(np.median(self.misfits[there])) if there.any() else np.nan
         # A smaller misfit than is usual in the picture comes of a window of few pixels, not of less noise.
-        misfits = np.maximum(self.misfits, usual)
-        return CORRELATED * misfits * np.sqrt(np.trace(self.spreads, axis1=1, axis2=2) / 2)
+        noise = 2 * np.sqrt(np.pi) * SMOOTHING_PX * np.maximum(self.misfits, usual)
+        # What moves a place is a bell across the edges, which smoothing makes lower and wider.
+        smoothed = self.blurs / np.hypot(self.blurs, SMOOTHING_PX)
+        return noise * np.sqrt(smoothed * np.trace(self.spreads, axis1=1, axis2=2) / 2)
 
     def spoilt(self) -> NDArray[np.bool_]:
         """Tell which corners (N,) were not fitted, or not as well as the others: a shadow's edge or glare."""

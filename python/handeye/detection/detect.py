@@ -13,7 +13,6 @@ from handeye.detection.base import Detection, Image, NotFound, Reason, upright
 from handeye.detection.description import explained
 from handeye.detection.plausible import implausible
 from handeye.detection.predicted import Prediction, where_expected
-from handeye.detection.quality import scaled
 from handeye.detection.registration import Aligned
 from handeye.errors import InputError
 from handeye.types import Charuco, Chessboard, CircleGrid, Target
@@ -21,7 +20,7 @@ from handeye.types.target import MarkerCorners
 
 SMALLEST_SIDE_PX = 24
 # To be raised with every change of what is detected, or where.
-VERSION = 10
+VERSION = 11
 
 
 @dataclass(frozen=True)
@@ -91,12 +90,12 @@ def detect(image: Image, target: Target, *, predicted: Prediction | None = None)
     if predicted is not None:
         found = _where_predicted(whole, positive, kind, predicted)
         if found is not None and implausible(target, found) is None:
-            return scaled(target, found)
+            return found
     try:
         found = kind.find(whole, positive)
         if isinstance(found, NotFound):
             found = explained(image, target, found)
-        return found if isinstance(found, NotFound) else implausible(target, found) or scaled(target, found)
+        return found if isinstance(found, NotFound) else implausible(target, found) or found
     except cv2.error as error:
         # OpenCV asserts on some contents; to the caller that is one image without a target, not a crash.
         return NotFound(Reason.DETECTOR_FAILED, f"OpenCV: {str(error).strip()[:200]}")

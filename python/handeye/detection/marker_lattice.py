@@ -200,7 +200,7 @@ def _would_show_more(lattice: MarkerLattice, image_size: tuple[int, int]) -> boo
 
 def _in_picture(places: IndexArray, lattice: MarkerLattice, image_size: tuple[int, int]) -> NDArray[np.bool_]:
     """Tell which places (N, 2) of the lattice, and all around them, are in the picture."""
-    if min(lattice.shape) < 2:
+    if min(lattice.shape) < 2 or len(lattice.places) < 4:
         return np.zeros(len(places), dtype=np.bool_)
     centres = lattice.reading.corners.mean(axis=1)
     found, _ = cv2.findHomography(lattice.places.astype(np.float64), centres, cv2.LMEDS)

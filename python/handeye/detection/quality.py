@@ -5,75 +5,119 @@ it is beside the others; how far all of them are off a flat board seen through a
 The fewer the points, the more what is usual counts.
 """
 
-import cv2
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
-from handeye.detection.base import Detection
-from handeye.detection.part import mapped
+from handeye.detection.base import Detection, Image, ordered
+from handeye.detection.bent_board import BentBoard
 from handeye.types import Target
-from handeye.types.arrays import FloatArray
+from handeye.types.arrays import FloatArray, IndexArray
 
-# Numbers of a homography; a lens adds polynomials in the image, those of its distortion, of a degree that so
-# many points tell.
-OF_HOMOGRAPHY, POINTS_OF_DEGREE = 8, {5: 36, 4: 26, 3: 16}
-# What is usual counts as one measurement.
-USUAL_COUNT = 1.0
+# What is usual may be wrong by a power of ten, up or down: a variance that so many measurements tell is known
+# as well.
+USUAL_COUNT = 2 / np.log(10) ** 2
 # No point is better.
 LEAST_PX = 0.001
-# The largest of the squares are left out, as a few points may lie elsewhere; the mean of the others of a
-# Gaussian is this share of its variance.
-TRIMMED, OF_VARIANCE = 0.03, 0.831
-# Squared distances over variances of both coordinates that one point in ten thousand exceeds.
-ASTRAY = 18.4
+# Squared distances over variances of both coordinates that one point in ten thousand exceeds: it lies astray.
+# Where fewer coordinates are free than this, nothing tells such points from the others.
+ASTRAY, FEWEST_FREE = 18.4, 30
+# Points are left out so many times at most; those that are free to less than this share tell nothing of it.
+# Of those that fitted so far only such as are nearly as far off as the worst are left out in one round.
+ROUNDS, LEAST_FREE, WORST_SHARE = 6, 1e-3, 0.5
 
 
-def off_plane(
-    plane: FloatArray, pixels: FloatArray, moves: FloatArray | None = None
-) -> tuple[FloatArray, int, FloatArray] | None:
-    """Return by how much (N, 2) points in an image are off those of a flat board seen through a lens.
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """How points lie about the view of a flat board that most of them fit best.
 
-    Also how many of their coordinates such a view leaves free, and what of some moves (N, K) of the points,
-    each of one coordinate, no view of a flat board makes; None where there is no such view.
+    Attributes
+    ----------
+    factor, freedom
+        Mean square over the variances that were expected, and how many coordinates it is of.
+    kept
+        (N,) which points fit.
+    squares
+        (N,) squared distances in px^2 of the points from the view.
+    shares, covariance
+        (K, C) of each column of the board how much is in the view, and (K, K) how well that is known for
+        coordinates of the variances that were expected.
     """
-    # OpenCV gives None where it finds none, whatever its types say.
-    found, _ = cv2.findHomography(plane, pixels, 0)
-    if found is None:  # pyright: ignore[reportUnnecessaryComparison]
+
+    factor: float
+    freedom: int
+    kept: NDArray[np.bool_]
+    squares: FloatArray
+    shares: FloatArray
+    covariance: FloatArray
+
+
+def scatter(board: BentBoard, sigmas: FloatArray) -> Scatter | None:
+    """Return how points with relative deviations (N,) lie; None where nothing is left free."""
+    best, kept = None, np.ones(len(sigmas), dtype=np.bool_)
+    for _ in range(ROUNDS):
+        found = _about(board, sigmas, kept)
+        if found is None:
+            return best
+        best, fits = found
+        left_free = best.freedom - 2 * int(kept.sum()) + 2 * int(fits.sum())
+        if min(best.freedom, left_free) < FEWEST_FREE or (fits == kept).all():
+            return best
+        kept = fits
+    return best
+
+
+def _about(
+    board: BentBoard, sigmas: FloatArray, kept: NDArray[np.bool_]
+) -> tuple[Scatter, NDArray[np.bool_]] | None:
+    """Return how points lie about the view that those kept (N,) fit best, and which points fit it."""
+    each = len(board.columns) // len(sigmas)
+    weights, rows = np.repeat(1 / sigmas, each)[:, np.newaxis], np.repeat(kept, each)
+    columns, off = weights * board.columns, weights * board.rows(board.off)
+    left, sizes, right = np.linalg.svd(columns[rows], full_matrices=False)
+    told = np.asarray(sizes > 1e-12 * sizes[0], dtype=np.bool_)
+    solving = np.asarray(right[told].T / sizes[told], dtype=np.float64)
+    shares = np.asarray(solving @ (left[:, told].T @ off[rows]), dtype=np.float64)
+    # The view follows the points that it was fitted to, as far as they hold it alone.
+    held = board.points(np.vecdot(columns @ solving, columns @ solving)).mean(axis=1)
+    signs = np.where(kept, -1.0, 1.0)
+    free = np.maximum(1 + signs * held, LEAST_FREE)
+    squares = (board.points(off - columns @ shares) ** 2).sum(axis=1)
+    freedom = 2 * int(kept.sum()) - int(told.sum()) * off.shape[1]
+    if freedom <= 0:
         return None
-    off = pixels - mapped(np.asarray(found, dtype=np.float64), plane)
-    off = off if moves is None else np.concatenate([off, moves], axis=1)
-    for degree, fewest in POINTS_OF_DEGREE.items():
-        if len(plane) >= fewest:
-            powers = [(i, k) for i in range(degree + 1) for k in range(degree + 1 - i)]
-            low, high = pixels.min(axis=0), pixels.max(axis=0)
-            x, y = ((2 * pixels - low - high) / np.maximum(high - low, 1e-12)).T
-            columns = np.stack([x**i * y**k for i, k in powers], axis=1)
-            # What another homography would change is in the polynomials, too.
-            left = off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0]
-            return left[:, :2], 2 * (len(plane) - len(powers)), left[:, 2:]
-    return off[:, :2], 2 * len(plane) - OF_HOMOGRAPHY, off[:, 2:]
+    factor = float(squares[kept].sum()) / freedom
+    # The median of squared distances in two dimensions is so many of their variances.
+    usual = float(np.median(squares[kept] / free[kept])) / (2 * np.log(2))
+    excess = squares / np.maximum(ASTRAY * usual * free, 1e-30)
+    found = Scatter(factor, freedom, kept, squares * sigmas**2, shares, solving @ solving.T)
+    # The worst first: it drags those around it.
+    return found, excess <= np.where(kept, max(1.0, WORST_SHARE * float(excess[kept].max())), 1.0)
 
 
-def scaled(target: Target, detection: Detection) -> Detection:
-    """Return a detection whose standard deviations fit how its points lie on the board.
+def stated(
+    image: Image,
+    target: Target,
+    point_ids: IndexArray,
+    pixels: FloatArray,
+    sigmas_px: FloatArray,
+    shared_px: FloatArray | float = 0.0,
+) -> Detection:
+    """Return points (N, 2) as a detection whose standard deviations fit how they lie on the board.
 
-    Up to then they may be wrong by a factor, the same for all points.
+    Up to then those (N,) may be wrong by a factor, the same for all points. Deviations that all points
+    share, so that they do not show, are added.
     """
-    if detection.sigmas_px is None:
-        return detection
-    # A larger circle lies elsewhere in perspective than its neighbours say, which is no error of it.
-    radii = target.radii_m[detection.point_ids]
-    told = radii == np.median(radii)
-    relative = detection.sigmas_px
-    off = off_plane(target.points[detection.point_ids[told], :2], detection.pixels[told])
-    variances = relative**2
-    if off is not None and off[1] > 0:
-        residuals, freedom, _ = off
-        sorted_squares = np.sort(((residuals / relative[told, np.newaxis]) ** 2).ravel())
-        kept = sorted_squares[: round((1 - TRIMMED) * len(sorted_squares))]
-        variance = float(kept.mean()) / OF_VARIANCE * residuals.size / freedom
-        # What is usual may be wrong by a power of ten, up or down, so it is logarithms that are weighed.
-        variances *= variance ** (freedom / (freedom + USUAL_COUNT))
-        # A point that lies further off than chance brings it was measured worse than its picture tells.
-        squares = (residuals**2).sum(axis=1)
-        variances[told] = np.where(squares > ASTRAY * variances[told], squares / 2, variances[told])
-    return detection.with_sigmas(np.maximum(np.sqrt(variances), LEAST_PX))
+    plane, radii = target.points[point_ids, :2], target.radii_m[point_ids]
+    board = BentBoard.of(plane, radii, pixels, (image.shape[1], image.shape[0]))
+    variances = sigmas_px**2
+    found = None if board is None else scatter(board, sigmas_px)
+    if found is not None:
+        count = found.freedom + USUAL_COUNT
+        # Logarithms are weighed. What so few tell is spread as Student's t, whose variance is larger.
+        variances = variances * found.factor ** (found.freedom / count) * count / max(count - 2, 1.0)
+        # A point that lies astray was measured worse than its picture tells.
+        variances = np.where(found.kept, variances, np.maximum(variances, found.squares / 2))
+    sigmas = np.maximum(np.sqrt(variances), LEAST_PX)
+    return ordered(target, point_ids, pixels, np.hypot(sigmas, shared_px))

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 
 from handeye import _core
-from handeye.detection.base import Detection, Image, NotFound, Reason, inside, ordered
+from handeye.detection.base import Detection, Image, NotFound, Reason, inside
+from handeye.detection.code_corners import cell_m, code_corners
 from handeye.detection.corner_fit import (
     ASTRAY_PX,
     BAND_SHARE,
@@ -22,7 +23,14 @@ from handeye.detection.corner_fit import (
     spread,
 )
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.edge_shift import unknown_shift_px, without_edge_shift
+from handeye.detection.edge_shift import (
+    FEWEST,
+    FEWEST_OF_BITS,
+    USUAL_PX,
+    outwards,
+    shift_of_few,
+    without_edge_shift,
+)
 from handeye.detection.marker_lattice import contradiction
 from handeye.detection.marker_sides import side_meetings
 from handeye.detection.markers import (
@@ -34,6 +42,7 @@ from handeye.detection.markers import (
     find_markers,
     from_neighbours,
 )
+from handeye.detection.quality import stated
 from handeye.detection.registration import Aligned, drawn
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.target import MarkerCorners
@@ -51,6 +60,8 @@ FEWEST_TAGS = 2
 # So many markers do not tell which of their corners is none, but their sides do; fitted corners are no
 # further from where sides meet than this many of the latter's deviations.
 FEW_MARKERS, MEETING_SIGMAS = 3, 3.0
+# Where edges meet at a sharp angle, corners go further than edges: of few markers they are not known to this.
+LARGEST_SHARED_PX = 0.5
 # Numbers of the map from a board to a picture, and the least deviation of the directions that it tells.
 OF_MAP, LEAST_TURN = 22, 1e-3
 # Cells of the code along a side that show at its corner where they are blurred.
@@ -121,11 +132,9 @@ def measured(image: Image, target: MarkerCorners, markers: Seen) -> Detection | 
     good = good[np.linalg.norm(expected - places[good], axis=1) <= ASTRAY_PX]
     if len(good) < 4:
         return NotFound(Reason.INCOMPLETE, f"{len(tags)} tags, but their corners are cut or unclear")
-    there = points.ravel()[good]
-    unit = _unit(_sides(target, tags) @ steps)[good]
-    sharp = without_edge_shift(plane[good], places[good], unit, _lights(target)[there])
-    sigmas = np.hypot(sigmas[good], unknown_shift_px(len(good)))
-    return ordered(target, there, sharp, sigmas)
+    return _stated(image, target, tags, good, places, steps, sigmas, blur) or NotFound(
+        Reason.INCOMPLETE, f"{len(tags)} tags, but seen so obliquely that their corners are unclear"
+    )
 
 
 def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | None:
@@ -157,9 +166,50 @@ def confirm(image: Image, target: MarkerCorners, board: Aligned) -> Detection | 
     good &= ~astray(places_px, corners, side * np.linalg.norm(steps, axis=2).min(axis=1))
     if good.sum() < max(4, LEAST_SHARE * 4 * expected.sum()):
         return None
-    unit = _unit(_sides(target, tags) @ steps)[good]
-    sharp = without_edge_shift(plane[good], places_px[good], unit, _lights(target)[ids[good]])
-    return ordered(target, ids[good], sharp, np.hypot(sigmas[good], unknown_shift_px(len(good))))
+    return _stated(image, target, tags, np.flatnonzero(good), places_px, steps, sigmas, blur)
+
+
+def _stated(
+    image: Image,
+    target: MarkerCorners,
+    tags: IndexArray,
+    good: IndexArray,
+    places: FloatArray,
+    steps: FloatArray,
+    sigmas: FloatArray,
+    blur_px: float,
+) -> Detection | None:
+    """Return the detection of those corners that are good among those (4 M) of markers (M,), edges put right.
+
+    None where it is not known where all of a few are. They were measured at places, with deviations; steps
+    (4 M, 2, 2) are the pixels per metre along both axes.
+    """
+    ids = (4 * tags[:, np.newaxis] + np.arange(4)).ravel()[good]
+    plane, pixels = target.points[ids, :2], places[good]
+    sides = _unit(_sides(target, tags) @ steps)[good]
+    size = image.shape[1], image.shape[0]
+    if len(good) >= FEWEST:
+        sharp = without_edge_shift(plane, pixels, size, sides, _lights(target)[ids])
+        return stated(image, target, ids, sharp, sigmas[good])
+    if _is_touched(target):
+        return stated(image, target, ids, pixels, sigmas[good])
+    shift, sigma = 0.0, USUAL_PX
+    lens = _core.PlaneMap.fitted(plane, pixels)
+    if lens is not None:
+        bits, seen = code_corners(image, target, tags, lens, blur_px)
+        if len(bits.plane) >= FEWEST_OF_BITS:
+            shift, sigma = shift_of_few(
+                np.concatenate([plane, bits.plane]),
+                np.concatenate([pixels, seen]),
+                size,
+                np.concatenate([sides, _unit(bits.sides @ lens.steps(bits.plane, cell_m(target) / 2))]),
+                np.concatenate([np.ones(len(plane)), bits.signs]),
+            )
+    moves = outwards(sides, np.ones((len(sides), 2, 1)))[0]
+    shared = sigma * np.sqrt((moves**2).mean(axis=1))
+    if shared.max() > LARGEST_SHARED_PX:
+        return None
+    return stated(image, target, ids, pixels - shift * moves, sigmas[good], shared)
 
 
 def _markers(image: Image, target: MarkerCorners) -> Seen:
