@@ -42,8 +42,10 @@ COMMANDS = {
     "study twin": ("study", "twin", "--output", "twin"),
     "study twin, rendered": ("study", "twin", "--render", "--sets", "1", "--trials", "2", "--output", "twin"),
 }
-# What says how long something took: lines of a journal, and what is printed or written for people.
-TIMINGS = re.compile(rb'"timings_s":\{[^}]*\}|"chain":"[0-9a-f]+"|\b[0-9.]+ s(econds)?\b')
+# What says when something was made or how long it took: in journals, and in what is written for people.
+TIMINGS = re.compile(
+    rb'"timings_s":\{[^}]*\}|"chain":"[0-9a-f]+"|\b[0-9.]+ s(econds)?\b|[0-9]{4}-[0-9-]{5} [0-9:]{5} UTC'
+)
 
 
 def configurations(seed: int) -> dict[str, Configuration]:
