@@ -64,12 +64,12 @@ def test_a_detector_that_does_not_see_depth_is_found() -> None:
     assert levels["detector_across_m"] < 0.5e-3
 
 
-def wrongly_built(seed: int) -> PosePairs:
-    """Stations of an arm whose links are off by 0.5 mm and 0.1 degrees, under a detector that is as bad."""
+def wrongly_built(seed: int, length_m: float, angle_deg: float) -> PosePairs:
+    """Stations of an arm whose links are off by so much, under a detector that is off by a millimetre."""
     random = np.random.default_rng(seed)
     arm = simulated_arm()
     joints = POSTURE_RAD + random.uniform(-0.7, 0.7, (24, 6))
-    truly = displaced(arm, random_displacements(random, arm, 0.5e-3, float(np.deg2rad(0.1)))).forward(joints)
+    truly = displaced(arm, random_displacements(random, arm, length_m, float(np.deg2rad(angle_deg)))).forward(joints)
     poses = []
     for reported, true in zip(arm.forward(joints), truly, strict=True):
         seen = (X @ Pose(true).inverse() @ Y).matrix.copy()
@@ -79,13 +79,14 @@ def wrongly_built(seed: int) -> PosePairs:
     return PosePairs("wrongly built", "test", Mounting.EYE_IN_HAND, numbered(poses))
 
 
-def test_an_arm_that_nobody_vouches_for_may_be_wrongly_built() -> None:
+@pytest.mark.parametrize(("length_m", "angle_deg"), [(0.5e-3, 0.1), (3e-3, 0.01)])
+def test_an_arm_that_nobody_vouches_for_may_be_wrongly_built(length_m: float, angle_deg: float) -> None:
     held = []
     for seed in range(16):
-        solved = solve_poses(wrongly_built(seed))
+        solved = solve_poses(wrongly_built(seed, length_m, angle_deg))
         squared = metrics.nees(solved.X, solved.covariance, X)
         held.append(metrics.region_holds(squared, solved.degrees_of_freedom))
-        assert solved.within_95.translation_mm < 20
+        assert solved.within_95.translation_mm < 60
     assert sum(held) >= 11
 
 

@@ -24,18 +24,19 @@ struct Beliefs {
     /// See [`LevelPrior::Deviation`], degrees.
     size_deg: f64,
     exponent: f64,
-    /// Lever that turns the rotation into a translation, metres.
+    /// Lever that turns the rotation into a translation, metres, and by which factor (natural logarithm) it may differ.
     lever_m: f64,
+    lever_spread: f64,
 }
 
 /// Wrists are short, and what they hide is small.
-const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.26, lever_m: 0.4 };
+const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.26, lever_m: 0.4, lever_spread: 0.7 };
 /// Shoulders and mountings carry the whole reach.
-const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.6, lever_m: 1.0 };
+const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.6, lever_m: 1.0, lever_spread: 0.7 };
 /// Of an arm that is known by a list of poses alone nobody has said that it was ever calibrated, and its pictures, which
 /// would tell what is the detector's, are not there.
-const AT_FLANGE_UNSEEN: Beliefs = Beliefs { size_deg: 0.16, ..AT_FLANGE };
-const AT_BASE_UNSEEN: Beliefs = Beliefs { size_deg: 0.08, ..AT_BASE };
+const AT_FLANGE_UNSEEN: Beliefs = Beliefs { size_deg: 0.16, lever_spread: 1.5, ..AT_FLANGE };
+const AT_BASE_UNSEEN: Beliefs = Beliefs { size_deg: 0.08, lever_spread: 1.5, ..AT_BASE };
 /// How surely a rough arm hides errors in proportion to its noise, and the lever of arms as rough: they are small.
 const ROUGH_SPREAD: f64 = 0.4;
 const ROUGH_LEVER_M: f64 = 0.6;
@@ -140,7 +141,7 @@ impl Component for Posture {
             Level { name: self.levels[0], start: 0.006 * degree, prior }
         };
         let lever_m = if rough { self.beliefs.lever_m.min(ROUGH_LEVER_M) } else { self.beliefs.lever_m };
-        vec![level, Level { name: self.levels[1], start: lever_m, prior: LevelPrior::Ratio { spread: 0.7 } }]
+        vec![level, Level { name: self.levels[1], start: lever_m, prior: LevelPrior::Ratio { spread: self.beliefs.lever_spread } }]
     }
 
     fn terms(&self, _: &Cell, linearisation: &Linearisation) -> Vec<Term> {
