@@ -17,6 +17,8 @@ OURS_COLOUR, OTHERS_COLOUR = "#0072B2", "#D98200"
 
 # Ticks in every decade, where the scale spans less than one of them and where it spans more.
 FEW_DECADES, NEAR, FAR = 1.0, (1, 1.5, 2, 3, 4, 5, 7), (1, 3)
+ALIKE_DECADES, ALIKE = 0.4, tuple(1 + k / 20 for k in range(180))
+MOST_TICKS = 6
 
 Rows = Mapping[str, Mapping[str, Any]]
 
@@ -62,8 +64,11 @@ def draw_errors(groups: Mapping[str, Rows]) -> Figure:
                     axis.plot(value, place, "o", color=colour, markersize=4)
             axis.set_xscale("log")
             low, high = axis.get_xlim()
-            steps = NEAR if np.log10(high / low) < FEW_DECADES else FAR
-            plain_ticks(axis.xaxis, [step * 10.0**decade for decade in range(-7, 5) for step in steps])
+            decades = np.log10(high / low)
+            steps = ALIKE if decades < ALIKE_DECADES else NEAR if decades < FEW_DECADES else FAR
+            ticks = [step * 10.0**decade for decade in range(-7, 5) for step in steps]
+            ticks = [tick for tick in ticks if low <= tick <= high]
+            plain_ticks(axis.xaxis, ticks[:: 1 + len(ticks) // MOST_TICKS])
             labels = [name.replace("_", " ") for name in names] if column == 0 else [""] * len(names)
             axis.set_yticks(range(len(names)), labels, fontsize=7)
             axis.invert_yaxis()

@@ -80,7 +80,8 @@ def _foretold(estimate: Estimate, measurements: Measurements, work: Work) -> Cal
     always = float(np.trace(noise, axis1=1, axis2=2).mean())
 
     def error(chosen: Sequence[int]) -> float:
-        covariance = np.linalg.inv(prior + taught[list(chosen)].sum(axis=0))
+        information = prior + taught[list(chosen)].sum(axis=0)
+        covariance = np.asarray(np.linalg.inv(information), np.float64)
         return float(np.sqrt(np.sum((flat @ covariance) * flat) / len(rows) + always))
 
     return error
