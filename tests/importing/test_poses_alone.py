@@ -69,7 +69,8 @@ def wrongly_built(seed: int, length_m: float, angle_deg: float) -> PosePairs:
     random = np.random.default_rng(seed)
     arm = simulated_arm()
     joints = POSTURE_RAD + random.uniform(-0.7, 0.7, (24, 6))
-    truly = displaced(arm, random_displacements(random, arm, length_m, float(np.deg2rad(angle_deg)))).forward(joints)
+    by = random_displacements(random, arm, length_m, float(np.deg2rad(angle_deg)))
+    truly = displaced(arm, by).forward(joints)
     poses = []
     for reported, true in zip(arm.forward(joints), truly, strict=True):
         seen = (X @ Pose(true).inverse() @ Y).matrix.copy()
