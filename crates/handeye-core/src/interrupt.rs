@@ -1,7 +1,7 @@
 //! Giving up a long calculation because its caller asks for it.
 //!
-//! Long loops call [`check`], or go over [`checked`] items. Where the caller has said how to ask ([`asking`]), and is told to stop, the calculation is
-//! unwound to there. The core itself knows neither clock nor signals.
+//! Long loops call [`check`], or go over [`checked`] items. Where the caller has said how to ask ([`asking`]), and is
+//! told to stop, the calculation is unwound to there. The core itself knows neither clock nor signals.
 
 use std::cell::Cell;
 use std::panic::resume_unwind;

@@ -30,9 +30,11 @@ struct Beliefs {
 }
 
 /// Wrists are short, and what they hide is small.
-const AT_FLANGE: Beliefs = Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.26, lever_m: 0.4, lever_spread: 0.7 };
+const AT_FLANGE: Beliefs =
+    Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.26, lever_m: 0.4, lever_spread: 0.7 };
 /// Shoulders and mountings carry the whole reach.
-const AT_BASE: Beliefs = Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.6, lever_m: 1.0, lever_spread: 0.7 };
+const AT_BASE: Beliefs =
+    Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.6, lever_m: 1.0, lever_spread: 0.7 };
 /// Of an arm that is known by a list of poses alone nobody has said that it was ever calibrated, and its pictures, which
 /// would tell what is the detector's, are not there.
 const AT_FLANGE_UNSEEN: Beliefs = Beliefs { size_deg: 0.16, lever_spread: 1.5, ..AT_FLANGE };
@@ -141,7 +143,14 @@ impl Component for Posture {
             Level { name: self.levels[0], start: 0.006 * degree, prior }
         };
         let lever_m = if rough { self.beliefs.lever_m.min(ROUGH_LEVER_M) } else { self.beliefs.lever_m };
-        vec![level, Level { name: self.levels[1], start: lever_m, prior: LevelPrior::Ratio { spread: self.beliefs.lever_spread } }]
+        vec![
+            level,
+            Level {
+                name: self.levels[1],
+                start: lever_m,
+                prior: LevelPrior::Ratio { spread: self.beliefs.lever_spread },
+            },
+        ]
     }
 
     fn terms(&self, _: &Cell, linearisation: &Linearisation) -> Vec<Term> {
