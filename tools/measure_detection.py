@@ -24,15 +24,7 @@ from handeye.cameras.render import Appearance, BoardRenderer, clutter
 from handeye.datasets import ImageSet, load
 from handeye.detection import Detection, NotFound, Prediction, calibrate_camera, detect, relabeled
 from handeye.detection.registration import printed
-from handeye.types import (
-    AprilGrid,
-    Camera,
-    Charuco,
-    Chessboard,
-    CircleGrid,
-    Pose,
-    Target,
-)
+from handeye.types import AprilGrid, Camera, Charuco, Chessboard, CircleGrid, Pose, Target
 
 WIDTH, HEIGHT = 1280, 1024
 CAMERA = Camera("brown_conrady_5", [1400, 1396, 645, 508, -0.12, 0.08, 5e-4, -4e-4, 0.0], WIDTH, HEIGHT)

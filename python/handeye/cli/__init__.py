@@ -3,8 +3,9 @@
 import os
 import sys
 
-# As in `handeye.errors.ExitCode`: importing this package costs nothing.
-INTERRUPTED = 130
+from handeye.errors import ExitCode
+
+INTERRUPTED = int(ExitCode.INTERRUPTED)
 
 
 def main() -> None:

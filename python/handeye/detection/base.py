@@ -75,10 +75,6 @@ class Detection:
     def __len__(self) -> int:
         return len(self.point_ids)
 
-    def with_sigmas(self, sigmas_px: FloatArray) -> "Detection":
-        """Return the detection with other standard deviations (N,)."""
-        return replace(self, sigmas_px=sigmas_px)
-
 
 class Reason(StrEnum):
     """Why a target was not found, as far as the image tells.

@@ -117,7 +117,9 @@ class Posed:
     def worth(self, estimate: PosesSolved, left: list[int]) -> FloatArray:
         """(len(left),) what samples take off the entropy of X and Y, nats."""
         _, rows, noise = station_rows(estimate, self.pairs.motions[left])
-        return _entropy_gains(estimate.information, _informations(rows, noise), 12)
+        now = _core.Belief(estimate.information).entropy
+        taught = _informations(rows, noise)
+        return np.array([now - _core.Belief(estimate.information + one).entropy for one in taught])
 
     def more(self, estimate: PosesSolved, count: int) -> tuple[tuple[str, ...], Within]:
         """Choose poses to go to once more: their names, and how far off the answer may be then."""
@@ -126,21 +128,14 @@ class Posed:
         information = estimate.information
         names: list[str] = []
         for _ in range(count):
-            best = int(np.argmax(_entropy_gains(information, taught, 6)))
+            after = [_core.Belief(information + one).hand_eye_entropy for one in taught]
+            best = int(np.argmin(after))
             names.append(self.names[best])
             information = information + taught[best]
-        before = np.asarray(np.linalg.inv(estimate.information), np.float64)[:6, :6]
-        after = np.asarray(np.linalg.inv(information), np.float64)[:6, :6]
-        found = foretold(before, estimate.covariance, after, comes_again=True)
+        before, then = (_core.Belief(one).covariance[:6, :6] for one in (estimate.information, information))
+        found = foretold(before, estimate.covariance, then, comes_again=True)
         return tuple(names), within(found, estimate.degrees_of_freedom)
 
 
 def _informations(rows: FloatArray, noise: FloatArray) -> FloatArray:
     return rows.swapaxes(1, 2) @ np.linalg.solve(noise, rows)
-
-
-def _entropy_gains(information: FloatArray, taught: FloatArray, first: int) -> FloatArray:
-    """(K,) what informations (K, n, n) take off the entropy of the first parameters, nats."""
-    after = np.linalg.inv(information + taught)[:, :first, :first]
-    before = np.linalg.inv(information)[:first, :first]
-    return np.asarray(0.5 * (np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1]))
