@@ -15,6 +15,7 @@ from handeye.errors import InputError, SolveError
 from handeye.estimation.arm import ArmModel, behind, velocities
 from handeye.estimation.camera_prior import CameraPrior, camera_prior
 from handeye.estimation.measurements import Measurements, ViewPose
+from handeye.estimation.pixels import Pixels, camera_of_pixels, moved_cameras, pixels_of
 from handeye.estimation.probing import ProbingRows, probing_rows
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
 from handeye.types.arrays import FloatArray
@@ -24,18 +25,11 @@ from handeye.types.pose import Pose
 from handeye.types.probing import Probing, Tip
 from handeye.types.rig import Body
 
-# No view's pixel noise is believed to be less. Even on rendered pictures corners err by a hundredth of a
-# pixel or so, much of it shared by neighbouring corners: such an error no number of points averages out.
-LEAST_PIXEL_SIGMA = 0.01
-# Degrees of freedom of the other views' pixel noise that a view's own is drawn to.
-PIXEL_PRIOR_DEGREES = 20.0
 # Pairs of nodes that the answer is averaged over.
 NODE_PAIRS = 16
 MOST_LINEARISATIONS = 8
 # A mirrored pose is looked at where it fits less than this many times worse than the best.
 MIRROR_RATIO = 8.0
-# Beyond this, in pixels anywhere in the image, what was measured through the camera is measured again.
-LARGEST_CAMERA_SHIFT_PX = 2.0
 MOST_CAMERAS = 4
 # Noise of a rotation or joint that arms in good order do not have, and about what they have at most.
 ROUGH_RAD, USUAL_NOISE_RAD = float(np.deg2rad(0.15)), float(np.deg2rad(0.03))
@@ -65,14 +59,6 @@ class _Begin(TypedDict):
 
 
 @dataclass(frozen=True, eq=False)
-class PixelNoise:
-    """Deviation of the pixels of each view of a pair (K,), and the factor for what neighbours share."""
-
-    sigma_px: FloatArray
-    shared: float
-
-
-@dataclass(frozen=True, eq=False)
 class CellFit:
     """What is believed of a cell, and where its parameters stand.
 
@@ -83,7 +69,7 @@ class CellFit:
     priors
         What was believed of each camera.
     pixels
-        Noise of the pixels of each pair.
+        What the pixels of each pair say.
     arm
         The arm, if it is known.
     posterior
@@ -94,7 +80,7 @@ class CellFit:
 
     measurements: RigMeasurements
     priors: Mapping[str, CameraPrior]
-    pixels: Mapping[Pair, PixelNoise]
+    pixels: Mapping[Pair, Pixels]
     arm: ArmModel | None
     posterior: _core.Posterior
     probing: Probing | None = None
@@ -236,20 +222,19 @@ def fit_cell(
     arm = None if kinematics is None else ArmModel.of(kinematics)
     touched = None if probing is None else probing_rows(measurements, probing, arm)
     once = partial(_once, arm=arm, touched=touched, play=play)
-    fit = once(measurements, priors, start=start)
+    # Where the pixels alone put the cameras, before all else is fitted around them.
+    pixels = pixels_of(measurements, priors)
     for _ in range(MOST_CAMERAS):
-        moved = {
-            name: camera
-            for name, camera in fit.cameras.items()
-            if not _largest_shift_px(priors[name].camera, camera) < LARGEST_CAMERA_SHIFT_PX
-        }
-        if not moved:
+        of_pixels = {name: camera_of_pixels(pixels, name, prior) for name, prior in priors.items()}
+        if not (moved := moved_cameras(priors, of_pixels)):
             break
-        measurements = measurements.through(moved)
-        priors = {
-            name: prior.moved(moved[name]) if name in moved else prior for name, prior in priors.items()
-        }
-        fit = once(measurements, priors, **_going_on(fit))
+        measurements, priors, pixels = _through(measurements, priors, moved)
+    fit = once(measurements, priors, pixels, start=start)
+    for _ in range(MOST_CAMERAS):
+        if not (moved := moved_cameras(priors, fit.cameras)):
+            break
+        measurements, priors, pixels = _through(measurements, priors, moved)
+        fit = once(measurements, priors, pixels, **_going_on(fit))
     unmirrored = {
         (camera, target): put_right
         for (camera, target), measured in measurements.pairs.items()
@@ -257,13 +242,23 @@ def fit_cell(
     }
     if unmirrored:
         measurements = measurements.with_pairs(unmirrored)
-        fit = once(measurements, priors, **_going_on(fit))
+        pixels = pixels_of(measurements, priors)
+        fit = once(measurements, priors, pixels, **_going_on(fit))
     rough = roughness(fit.posterior, described=arm is not None)
     if rough == 1.0:
         return fit
     # Such an arm has play too, most likely: as much as the views show of it.
     found = _going_on(fit, many_modes=True)
-    return once(measurements, priors, rough=rough, play=arm is not None, **found)
+    return once(measurements, priors, pixels, rough=rough, play=arm is not None, **found)
+
+
+def _through(
+    measurements: RigMeasurements, priors: Mapping[str, CameraPrior], moved: Mapping[str, Camera]
+) -> tuple[RigMeasurements, dict[str, CameraPrior], dict[Pair, Pixels]]:
+    """Return measurements, beliefs and pixels as of cameras that have moved."""
+    measurements = measurements.near(moved)
+    priors = {name: prior.moved(moved[name]) if name in moved else prior for name, prior in priors.items()}
+    return measurements, priors, pixels_of(measurements, priors)
 
 
 def roughness(posterior: _core.Posterior, *, described: bool) -> float:
@@ -297,6 +292,7 @@ def _going_on(fit: CellFit, *, many_modes: bool = False) -> _Begin:
 def _once(
     measurements: RigMeasurements,
     priors: Mapping[str, CameraPrior],
+    pixels: Mapping[Pair, Pixels],
     *,
     arm: ArmModel | None,
     start: Start | None,
@@ -311,27 +307,16 @@ def _once(
     place = {view.name: k for k, view in enumerate(measurements.stations)}
     camera_of = {name: i for i, name in enumerate(measurements.cameras)}
     target_of = {name: i for i, name in enumerate(measurements.targets)}
-    pixels: dict[Pair, PixelNoise] = {}
-    seen: list[tuple[int, int, _core.PoseMeasurements, list[int], list[float]]] = []
-    for (camera, target), measured in measurements.pairs.items():
-        if len(measured) == 0:
-            continue
-        poses = _core.PoseMeasurements(
-            measured.problem,
-            measured.camera_poses,
-            free_camera=list(priors[camera].free) or None,
-            board_scale=True,
-            sigmas_px=[
-                None if view.sigmas_px is None else np.hypot(view.sigmas_px, LEAST_PIXEL_SIGMA)
-                for view in measured.views
-            ],
+    seen = [
+        (
+            camera_of[camera],
+            target_of[target],
+            one.poses,
+            [place[view.name] for view in measurements.pairs[camera, target].views],
+            (one.shared**2 * np.square(one.sigma_px)).tolist(),
         )
-        variances = poses.shrunk_variances(prior_degrees=PIXEL_PRIOR_DEGREES, floor_px2=LEAST_PIXEL_SIGMA**2)
-        shared = poses.shared_error(variances)
-        pixels[camera, target] = PixelNoise(np.sqrt(variances), float(np.sqrt(shared)))
-        at = [place[view.name] for view in measured.views]
-        widened = [shared * variance for variance in variances]
-        seen.append((camera_of[camera], target_of[target], poses, at, widened))
+        for (camera, target), one in pixels.items()
+    ]
     of_arm = approach = None
     if arm is not None:
         joints = whole.joints if touched is None else np.concatenate([whole.joints, touched.joints])
@@ -372,20 +357,6 @@ def _once(
         levels=list(levels),
     )
     return CellFit(measurements, priors, pixels, arm, posterior, None if touched is None else touched.probing)
-
-
-def _largest_shift_px(before: Camera, after: Camera) -> float:
-    """How far pixels move between two cameras of one lens, at most over a grid of rays in the image."""
-    width, height = before.size_px
-    u, v = np.meshgrid(np.linspace(0, width - 1, 7), np.linspace(0, height - 1, 7))
-    fx, fy, cx, cy = before.parameters[:4]
-    rays = np.stack([(u.ravel() - cx) / fx, (v.ravel() - cy) / fy, np.ones(u.size)], axis=1)
-    first, seen = before.project(rays)
-    second, still = after.project(rays)
-    both = seen & still
-    if not both.any():
-        return float("inf")
-    return float(np.linalg.norm((second - first)[both], axis=1).max())
 
 
 def prefer_consistent_poses(measurements: Measurements, X: Pose, Y: Pose) -> Measurements | None:

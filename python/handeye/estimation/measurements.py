@@ -91,6 +91,23 @@ def view_pose(camera: Camera, target: Target, view: View) -> ViewPose:
     )
 
 
+def _moved(camera: Camera, target: Target, view: View, pose: ViewPose) -> ViewPose:
+    """Refine the poses of one view, which fit through a camera close to this one."""
+    points, radii = target.points[view.point_ids], target.radii_m[view.point_ids]
+
+    def refined(start: Pose) -> tuple[Pose, float, FloatArray]:
+        matrix, rmse_px, information = _core.refine_pose(
+            camera.lens, camera.parameters, points, radii, view.pixels, start.matrix
+        )
+        return Pose(matrix), rmse_px, information
+
+    best = refined(pose.T_camera_target)
+    if pose.mirrored is None:
+        return ViewPose(*best, None)
+    best, other = sorted((best, refined(pose.mirrored[0])), key=lambda fit: fit[1])
+    return ViewPose(*best, other[:2])
+
+
 @dataclass(frozen=True, eq=False)
 class Measurements:
     """Views of one target through one camera, ready to be solved.
@@ -157,6 +174,21 @@ class Measurements:
         """Return the measurements as made through another camera: every pose found again."""
         again = Measurements(self.mounting, camera, self.target, (), (), dict(self.rejected))
         return again.with_views(self.views)
+
+    def near(self, camera: Camera) -> "Measurements":
+        """Return the measurements as made through a camera close to this one.
+
+        Every pose is refined from the one it had; a view where that fails is measured from nothing.
+        """
+        again = Measurements(self.mounting, camera, self.target, (), (), dict(self.rejected))
+        for view, pose in zip(self.views, self.poses, strict=True):
+            try:
+                moved = _moved(camera, self.target, view, pose)
+            except HandeyeError:
+                again = again.with_views([view])
+            else:
+                again = replace(again, views=(*again.views, view), poses=(*again.poses, moved))
+        return again
 
     def __len__(self) -> int:
         return len(self.views)

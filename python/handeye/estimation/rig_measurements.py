@@ -1,6 +1,6 @@
 """What several cameras saw of several targets: one `Measurements` per pair, and the stations."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -76,13 +76,24 @@ class RigMeasurements:
 
     def through(self, cameras: Mapping[str, Camera]) -> "RigMeasurements":
         """Return the measurements as made through other cameras: their poses found again."""
+        return self._with_cameras(cameras, Measurements.through)
+
+    def near(self, cameras: Mapping[str, Camera]) -> "RigMeasurements":
+        """Return the measurements as made through cameras close to these: their poses refined."""
+        return self._with_cameras(cameras, Measurements.near)
+
+    def _with_cameras(
+        self, cameras: Mapping[str, Camera], measured_through: Callable[[Measurements, Camera], Measurements]
+    ) -> "RigMeasurements":
         return replace(
             self,
             cameras={
                 name: replace(one, camera=cameras.get(name, one.camera)) for name, one in self.cameras.items()
             },
             pairs={
-                (camera, target): measured.through(cameras[camera]) if camera in cameras else measured
+                (camera, target): measured_through(measured, cameras[camera])
+                if camera in cameras
+                else measured
                 for (camera, target), measured in self.pairs.items()
             },
         )

@@ -11,8 +11,8 @@ import numpy as np
 
 from handeye import _core
 from handeye.estimation.camera_prior import CameraPrior, camera_prior
-from handeye.estimation.cell_fit import LEAST_PIXEL_SIGMA, PIXEL_PRIOR_DEGREES
 from handeye.estimation.measurements import Measurements
+from handeye.estimation.pixels import LEAST_PIXEL_SIGMA, PIXEL_PRIOR_DEGREES
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.mounting import Mounting
 from handeye.types.target import Target
