@@ -178,17 +178,15 @@ class Measurements:
     def near(self, camera: Camera) -> "Measurements":
         """Return the measurements as made through a camera close to this one.
 
-        Every pose is refined from the one it had; a view where that fails is measured from nothing.
+        Every pose is refined from the one it had; where that fails all are found from nothing.
         """
-        again = Measurements(self.mounting, camera, self.target, (), (), dict(self.rejected))
-        for view, pose in zip(self.views, self.poses, strict=True):
-            try:
-                moved = _moved(camera, self.target, view, pose)
-            except HandeyeError:
-                again = again.with_views([view])
-            else:
-                again = replace(again, views=(*again.views, view), poses=(*again.poses, moved))
-        return again
+        try:
+            moved = tuple(
+                _moved(camera, self.target, *both) for both in zip(self.views, self.poses, strict=True)
+            )
+        except HandeyeError:
+            return self.through(camera)
+        return replace(self, camera=camera, poses=moved)
 
     def __len__(self) -> int:
         return len(self.views)
