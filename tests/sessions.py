@@ -3,14 +3,14 @@
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from handeye.robots.protocol import Goal
+from handeye.robots.protocol import Goal, Reading, Robot
 from handeye.robots.simulated import ArmErrors
 from handeye.session.attempt import Cell, Missed, Seen, arrive, look
 from handeye.session.configuration import begin, go_on, prepare
@@ -127,3 +127,31 @@ def run_killed(
         if os.WIFEXITED(status) and os.WEXITSTATUS(status) == 0:
             return kills
         kills += 1
+
+
+def number(label: str) -> int:
+    return int(label.split("_")[1].partition(".")[0])
+
+
+class Lying:
+    """A robot that goes only a part of the way at some views, and says that it went."""
+
+    def __init__(self, robot: Robot, at: Collection[int], share: float = 0.05) -> None:
+        self._robot, self._at, self._share = robot, at, share
+        self._claimed: Reading | None = None
+
+    def move_to(self, goal: Goal) -> None:
+        self._claimed = None
+        if number(goal.label) not in self._at:
+            self._robot.move_to(goal)
+            return
+        here = np.array(self._robot.read_pose().joints_rad)
+        there = here + self._share * (np.array(goal.joints_rad) - here)
+        self._robot.move_to(replace(goal, joints_rad=tuple(there.tolist())))
+        self._claimed = Reading(goal.T_base_flange, goal.joints_rad)
+
+    def read_pose(self) -> Reading:
+        return self._claimed or self._robot.read_pose()
+
+    def stop(self) -> None:
+        self._robot.stop()

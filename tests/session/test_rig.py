@@ -19,7 +19,7 @@ from handeye.session.rig_store import open_rig_session
 from handeye.session.settings import Configuration, RigSettings, Simulation
 from handeye.studies.rig_cell import rig_cell
 from handeye.studies.rig_loop import judged
-from sessions import RIG, Outcome, run_killed, run_rig
+from sessions import RIG, Lying, Outcome, run_killed, run_rig
 
 
 @pytest.fixture(scope="module")
@@ -174,6 +174,23 @@ def test_one_wrong_station_among_the_first_does_not_hold_up_the_others(
     assert max(run.error_mm.values()) < 5
     assert end.calibration is not None
     assert any(station in finding.sentence for finding in end.calibration.diagnosis)
+
+
+def test_a_rig_that_ended_without_an_answer_goes_on_when_the_robot_is_put_right(tmp_path: Path) -> None:
+    asked = replace(RIG, seed=202, rig=RigSettings(candidates=100))
+    prepared = rig_cell(asked)
+    lying = Lying(prepared.cell.robot, range(3, 100), 0.5)
+    session, store = begin_rig(replace(prepared, cell=replace(prepared.cell, robot=lying)), tmp_path / "s")
+    end = session.run()
+    store.close()
+    assert (end.stations, end.calibration) == (7, None)
+    end = run_rig(asked, tmp_path / "s")
+    assert 7 < end.stations <= 14
+    assert end.calibration is not None
+    assert end.estimate is not None
+    run = judged(prepared, end)
+    for name in prepared.recording.cameras:
+        assert run.error_mm[name] < 2 * end.estimate.of_camera(name).within_95.translation_mm
 
 
 class Watched:

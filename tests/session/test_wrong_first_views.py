@@ -7,40 +7,11 @@ import numpy as np
 import pytest
 
 from handeye.cameras.protocol import Frame, ImageSource, Points
-from handeye.robots.protocol import Goal, Reading, Robot
-from handeye.session.configuration import begin, prepare
+from handeye.session.configuration import begin, go_on, prepare
 from handeye.session.deciding import EndReason
-from sessions import configured
+from sessions import Lying, configured, number
 
 GOOD = {EndReason.ACCURACY_REACHED, EndReason.VIEWS_TAKEN, EndReason.OUT_OF_REACH}
-
-
-def number(label: str) -> int:
-    return int(label.split("_")[1].partition(".")[0])
-
-
-class Lying:
-    """A robot that hardly moves at some views, and says that it went."""
-
-    def __init__(self, robot: Robot, at: tuple[int, ...]) -> None:
-        self._robot, self._at = robot, at
-        self._claimed: Reading | None = None
-
-    def move_to(self, goal: Goal) -> None:
-        self._claimed = None
-        if number(goal.label) not in self._at:
-            self._robot.move_to(goal)
-            return
-        here = np.array(self._robot.read_pose().joints_rad)
-        there = here + 0.05 * (np.array(goal.joints_rad) - here)
-        self._robot.move_to(replace(goal, joints_rad=tuple(there.tolist())))
-        self._claimed = Reading(goal.T_base_flange, goal.joints_rad)
-
-    def read_pose(self) -> Reading:
-        return self._claimed or self._robot.read_pose()
-
-    def stop(self) -> None:
-        self._robot.stop()
 
 
 class Late:
@@ -90,6 +61,35 @@ def test_the_session_goes_on_without_them(
     wrong = {f"view_{n:02d}" for n in (*lies, *(n for n in late if n > 1))}
     assert not wrong & set(end.calibration.used)
     assert len(end.calibration.used) >= end.views - len(wrong)
+    assert prepared.truth is not None
+    assert prepared.truth.X is not None
+    off = (end.calibration.X @ prepared.truth.X.inverse()).log()
+    assert 1e3 * np.linalg.norm(off[:3]) < 2 * end.reach.translation_mm
+
+
+# Seed, share of the way, first view that lies: the views contradict one another, or leave a direction open.
+@pytest.mark.parametrize(
+    ("seed", "share", "first"), [(100, 0.5, 2), (105, 0.5, 3), (100, 0.9, 2), (106, 0.9, 3)]
+)
+def test_a_session_that_ended_without_an_answer_goes_on_when_the_robot_is_put_right(
+    seed: int, share: float, first: int, tmp_path: Path
+) -> None:
+    prepared = prepare(configured(seed, accuracy_mm=0.05, accuracy_deg=0.005, most_views=6))
+    lying = Lying(prepared.cell.robot, range(first, 100), share)
+    session, store = begin(replace(prepared, cell=replace(prepared.cell, robot=lying)), tmp_path / "s")
+    end = session.run()
+    store.close()
+    assert end.calibration is None
+    assert end.reason in {EndReason.REFUSED, EndReason.VIEWS_TAKEN}
+    assert (end.error is not None) == (end.reason is EndReason.REFUSED)
+    # What the arm's description and its joints agree on is no matter of how angles are written.
+    assert end.error is None or end.error.code == "inconsistent"
+    session, store, prepared = go_on(tmp_path / "s")
+    end = session.run()
+    store.close()
+    assert end.views <= 12
+    assert end.calibration is not None
+    assert end.reach is not None
     assert prepared.truth is not None
     assert prepared.truth.X is not None
     off = (end.calibration.X @ prepared.truth.X.inverse()).log()

@@ -9,7 +9,7 @@ import numpy as np
 
 from handeye.cli.answer import Answer
 from handeye.cli.session_report import report_of_session
-from handeye.errors import DetectionError, DeviceError, HandeyeError
+from handeye.errors import DegenerateError, DetectionError, DeviceError, HandeyeError, InputError, SolveError
 from handeye.estimation.lens_confidence import lens_difference_px
 from handeye.session.deciding import EndReason
 from handeye.session.loop import End
@@ -24,7 +24,13 @@ if TYPE_CHECKING:
 Found = TypeVar("Found")
 
 
-def found(calibration: Found | None, why: tuple[EndReason, str], folder: Path, taken: str) -> Found:
+def found(
+    calibration: Found | None,
+    why: tuple[EndReason, str],
+    folder: Path,
+    taken: str,
+    refused: HandeyeError | None = None,
+) -> Found:
     """Return what a run has found, where it ended for a reason that leaves an answer.
 
     Raises
@@ -38,6 +44,11 @@ def found(calibration: Found | None, why: tuple[EndReason, str], folder: Path, t
         raise DeviceError(sentence, code=reason, hint=hint)
     if reason is EndReason.NO_START:
         raise DetectionError(sentence, code=reason, hint=hint)
+    if reason is EndReason.REFUSED and refused is not None:
+        advice = hint if refused.hint is None else f"{refused.hint}; {hint}"
+        kinds = (SolveError, DegenerateError)
+        kind = next((kind for kind in kinds if isinstance(refused, kind)), InputError)
+        raise kind(sentence, code=refused.code, hint=advice)
     if calibration is None:
         raise HandeyeError(f"{sentence}; the {taken} do not determine the answer", code=reason, hint=hint)
     return calibration
@@ -52,7 +63,7 @@ def run_answer(folder: Path, configuration: Configuration, prepared: Prepared, e
         As `found`.
     """
     report = None if end.calibration is None else _report(folder, configuration)
-    calibration = found(end.calibration, (end.reason, end.sentence), folder, "views")
+    calibration = found(end.calibration, (end.reason, end.sentence), folder, "views", end.error)
     error: dict[str, float] | None = None
     if prepared.truth is not None and prepared.truth.X is not None:
         off = (calibration.X @ prepared.truth.X.inverse()).log()

@@ -127,7 +127,7 @@ def _run(
 
 
 def _answer(folder: Path, prepared: RigPrepared, end: RigEnd) -> Answer:
-    calibration = found(end.calibration, (end.reason, end.sentence), folder, "stations")
+    calibration = found(end.calibration, (end.reason, end.sentence), folder, "stations", end.error)
     run, asked = judged(prepared, end), prepared.configuration
 
     def told(name: str, within: Within) -> dict[str, Any]:

@@ -174,7 +174,7 @@ def calibrate(
     """
     check_views(measurements)
     return calibrate_examined(
-        examine(measurements),
+        examine(measurements, by_joints=kinematics is not None),
         model,
         reduced=reduced,
         kinematics=kinematics,

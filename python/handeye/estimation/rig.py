@@ -267,7 +267,7 @@ def solve_rig(
     if isinstance(recording, Recording):
         recording = RigRecording.of(recording)
     measurements = RigMeasurements.of(recording)
-    examinations = examine_rig(measurements)
+    examinations = examine_rig(measurements, by_joints=kinematics is not None)
     measurements = measurements.with_pairs({pair: e.measurements for pair, e in examinations.items()})
     measurements = agree_on_labels(measurements)
     estimate = estimate_rig(measurements, kinematics, camera_fixed=camera_fixed)
@@ -301,6 +301,8 @@ def estimate_rig(
     InputError
         Fewer than three stations, a camera that nothing ties to the arm, or views without joints that the arm
         needs.
+    SolveError
+        The views contradict one another: no camera is as they would have it.
 
     Examples
     --------
@@ -312,6 +314,7 @@ def estimate_rig(
     if previous is not None:
         start = (np.asarray(previous.fit.posterior.x), np.asarray(previous.fit.posterior.y))
     fit = fit_cell(measurements, kinematics, camera_fixed=camera_fixed, start=start)
+    _ = fit.cameras  # raises where one is no camera any more
     sigmas = np.concatenate([pixels.sigma_px for pixels in fit.pixels.values()])
     noise = noise_of(fit.posterior, fit.measurements.whole, fit.arm, sigmas)
     return RigEstimate(fit, noise, undetermined_rig(fit, noise), attribution_of(fit, noise))

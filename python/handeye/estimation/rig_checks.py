@@ -59,11 +59,12 @@ def check_tied(measurements: RigMeasurements) -> None:
             )
 
 
-def examine_rig(measurements: RigMeasurements) -> dict[Pair, Examination]:
+def examine_rig(measurements: RigMeasurements, *, by_joints: bool = False) -> dict[Pair, Examination]:
     """Look for mistakes in what each camera saw of each target that the arm moves against it.
 
     Few views of a pair cannot tell which of them is wrong. Where they contradict one another, those of
-    stations are left out at which the arm stood elsewhere by what several other pairs say.
+    stations are left out at which the arm stood elsewhere by what several other pairs say. `by_joints` is
+    that of `examine`.
 
     Raises
     ------
@@ -77,13 +78,13 @@ def examine_rig(measurements: RigMeasurements) -> dict[Pair, Examination]:
             found[pair] = Examination(measured)
             continue
         try:
-            found[pair] = examine(measured)
+            found[pair] = examine(measured, by_joints=by_joints)
         except HandeyeError as error:
             failed[pair] = error
     if failed:
         left_out = astray((measurements.pairs[pair], one.measurements) for pair, one in found.items())
         for pair, error in failed.items():
-            found[pair] = _without(left_out, measurements, pair, error)
+            found[pair] = _without(left_out, measurements, pair, error, by_joints=by_joints)
     return {pair: found[pair] for pair in measurements.pairs}
 
 
@@ -110,7 +111,12 @@ def astray(examined: Iterable[tuple[Measurements, Measurements]]) -> frozenset[s
 
 
 def _without(
-    left_out: frozenset[str], measurements: RigMeasurements, pair: Pair, error: HandeyeError
+    left_out: frozenset[str],
+    measurements: RigMeasurements,
+    pair: Pair,
+    error: HandeyeError,
+    *,
+    by_joints: bool,
 ) -> Examination:
     """Examine a pair whose views contradict one another without some stations."""
     measured = measurements.pairs[pair]
@@ -118,7 +124,7 @@ def _without(
     try:
         if len(rest) == len(measured):
             raise error
-        return examine(rest) if len(rest) >= FEWEST_STATIONS else Examination(rest)
+        return examine(rest, by_joints=by_joints) if len(rest) >= FEWEST_STATIONS else Examination(rest)
     except HandeyeError as failure:
         if len(measurements.pairs) == 1:
             raise

@@ -103,7 +103,7 @@ def gather_recording(
     measurements = Measurements.of_recording(recording)
     doubtful = doubt(opened.folder)
     kinematics = None if doubtful else arm_of(opened.folder, recording, model)
-    examination = examine(measurements)
+    examination = examine(measurements, by_joints=kinematics is not None)
     calibration = calibrate_examined(
         examination, model, reduced=reduced, kinematics=kinematics, work=work or Work()
     )

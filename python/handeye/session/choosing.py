@@ -29,7 +29,7 @@ from handeye.session.deciding import (
     halt_of,
 )
 from handeye.session.entry import TRANSIENT, Entry, Failure
-from handeye.session.starting import Start, largest_tilt_rad, starting_goal
+from handeye.session.starting import MOST_VIEWS, Start, largest_tilt_rad, once_more, starting_goal
 from handeye.session.wish import Wish
 from handeye.types import Camera, Pose
 
@@ -85,7 +85,9 @@ class ArmChooser:
     def choose(self, situation: Situation) -> Step | Halt:
         """Return the next step, or why there is none."""
         missed, estimate = situation.counted, situation.estimate
-        halt = situation.too_many(self._wish.failures_in_a_row)
+        halt = situation.too_many(self._wish.failures_in_a_row) or situation.full(
+            self._wish.most_views, "views"
+        )
         if halt is not None:
             return halt
         last = situation.to_repeat(self._wish.tries_at_a_place)
@@ -94,7 +96,7 @@ class ArmChooser:
             return Step(goal, "retry", {"after": last.number}, None if situation.doubtful else estimate)
         if estimate is None:
             return self._starting(situation)
-        if situation.doubtful:
+        if situation.doubtful and len(situation.views) < MOST_VIEWS:
             # What is seen around the start is judged by no belief, and tells which of the views are wrong.
             step = self._starting(replace(situation, estimate=None))
             if isinstance(step, Step):
@@ -119,10 +121,13 @@ class ArmChooser:
                 else f"nothing comes of the first view, where the arm stands: {last.failure}: {last.detail}",
             )
         places = len({entry.goal_joints for entry in missed})
+        number = len(views)
+        if estimate is None:
+            number, places = once_more(number, places)
         body = self._body if estimate is None else self._generator.body(estimate)
         tilt_rad = largest_tilt_rad(views[0], self._camera) if views else 0.0
         standing = situation.standing(self._start)
-        found = starting_goal(self._start, len(views), places, tilt_rad, body, standing)
+        found = starting_goal(self._start, number, places, tilt_rad, body, standing)
         if found is None:
             return Halt(
                 EndReason.NO_START if estimate is None else EndReason.NO_CANDIDATE,
@@ -161,7 +166,7 @@ class ArmChooser:
         options = PlannerOptions(
             policy=self._wish.policy,
             criterion=self._wish.criterion(estimate, situation.measurements),
-            stop_rules=self._wish.rules(),
+            stop_rules=() if situation.goes_on else self._wish.rules(),
             sight=drawn.sight,
             seed=self._wish.seed,
             travel=Travel(

@@ -1,5 +1,6 @@
 """What a decision of the loop may look at, and what it can be: a step, or a halt."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -38,14 +39,15 @@ class EndReason(StrEnum):
     TOO_MANY_FAILURES = "too_many_failures"
     ROBOT_HANGS = "robot_hangs"
     BY_HAND = "by_hand"
+    REFUSED = "refused"
 
 
 # Ends without an answer.
-FAILED = (EndReason.NO_START, EndReason.TOO_MANY_FAILURES, EndReason.ROBOT_HANGS)
+FAILED = (EndReason.NO_START, EndReason.TOO_MANY_FAILURES, EndReason.ROBOT_HANGS, EndReason.REFUSED)
 
 
 @dataclass(frozen=True, eq=False)
-class Attempts:
+class Attempts(ABC):
     """What was tried so far.
 
     Parameters
@@ -55,10 +57,32 @@ class Attempts:
     forgiven
         How many of the attempts since the last view do not count any more: the session ended with them, and
         was told to go on.
+    granted
+        How many views or stations may be taken beyond those asked for while there is no answer: the session
+        ended without one, and was told to go on.
+    doubtful
+        Whether what was seen contradicts itself so that nobody can say yet which of it is wrong.
     """
 
     entries: tuple[Entry, ...]
     forgiven: int = field(default=0, kw_only=True)
+    granted: int = field(default=0, kw_only=True)
+    doubtful: bool = field(default=False, kw_only=True)
+
+    @property
+    @abstractmethod
+    def taken(self) -> int:
+        """Return how many views or stations count."""
+
+    @property
+    @abstractmethod
+    def is_open(self) -> bool:
+        """Tell whether there is no answer yet."""
+
+    @property
+    def goes_on(self) -> bool:
+        """Tell whether no promise of accuracy is to be believed: only the number of views ends it."""
+        return self.doubtful or (self.granted > 0 and self.is_open)
 
     @cached_property
     def missed(self) -> list[Entry]:
@@ -113,6 +137,12 @@ class Attempts:
             f"{len(self.counted)} attempts in a row brought no view; the last: {last.failure}: {last.detail}",
         )
 
+    def full(self, most: int, what: str) -> "Halt | None":
+        """Return that as many were taken as asked for, without an answer; None if they are fewer."""
+        if not self.is_open or self.taken < most + self.granted:
+            return None
+        return Halt(EndReason.VIEWS_TAKEN, f"{self.taken} {what} taken, as asked")
+
     def to_repeat(self, tries: int) -> Entry | None:
         """Return the last attempt if it failed for no reason of its place, and is worth another try there."""
         if not self.counted or self.counted[-1].failure not in TRANSIENT:
@@ -134,8 +164,6 @@ class Situation(Attempts):
         Those of them to plan from: views that turned out wrong are left out.
     estimate
         What is believed; None after fewer than three views.
-    doubtful
-        Whether the views contradict one another so that nobody can say yet which of them is wrong.
 
     Examples
     --------
@@ -146,7 +174,16 @@ class Situation(Attempts):
     views: tuple[View, ...]
     measurements: Measurements
     estimate: Estimate | None
-    doubtful: bool = field(default=False, kw_only=True)
+
+    @property
+    def taken(self) -> int:
+        """Return how many views count."""
+        return len(self.views)
+
+    @property
+    def is_open(self) -> bool:
+        """Tell whether the views are in doubt or do not determine the answer."""
+        return self.doubtful or self.estimate is None or not self.estimate.determined
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from handeye.codes import Code
-from handeye.errors import InputError, SolveError
+from handeye.errors import HandeyeError, InputError, SolveError
 from handeye.estimation import Estimate, Estimator, Measurements, calibrate_examined, make_estimator
 from handeye.estimation.confidence import Within
 from handeye.estimation.faults import Examination, examine
@@ -30,7 +30,8 @@ FEWEST_EXAMINED = 5
 class End:
     """How a run ended: the answer if the views determine one, and how far off it may be.
 
-    `lens_px` is within how many pixels the lens is known, where the views taught it; None otherwise.
+    `lens_px` is within how many pixels the lens is known, where the views taught it; None otherwise. `error`
+    says why the views are refused, where they are.
 
     Examples
     --------
@@ -47,6 +48,7 @@ class End:
     attempts: int
     estimate: Estimate | None = None
     lens_px: float | None = None
+    error: HandeyeError | None = None
 
 
 class Session(Stepping[Situation, End]):
@@ -87,6 +89,7 @@ class Session(Stepping[Situation, End]):
         self._wish = wish
         known = wish.joints_err and wish.model is ModelName.AUTO
         self._kinematics = chooser.kinematics if known else None
+        self._by_joints = chooser.kinematics is not None
         self._estimator: Estimator = make_estimator(wish.model, self._kinematics, height=wish.height)
         # Where no camera was given there is none until the views teach one.
         self._learning = store.self_calibration
@@ -95,9 +98,11 @@ class Session(Stepping[Situation, End]):
     def _situation(self) -> Situation | Halt:
         views = self._usable()
         measurements, estimate, doubtful = self._planned_from(views)
-        if len(measurements) < len(views) and len(views) >= self._wish.most_views:
+        situation = Situation(self._entries(), tuple(views), measurements, estimate, doubtful=doubtful)
+        left_out = len(measurements) < len(views)
+        if left_out and not situation.is_open and len(views) >= self._wish.most_views:
             return Halt(EndReason.VIEWS_TAKEN, f"{len(views)} views taken, as asked")
-        return Situation(self._entries(), tuple(views), measurements, estimate, doubtful=doubtful)
+        return situation
 
     @property
     def views(self) -> tuple[View, ...]:
@@ -190,11 +195,11 @@ class Session(Stepping[Situation, End]):
 
     def _examined(self, measurements: Measurements) -> Examination:
         """Look for mistakes; a camera that the views teach is found again without those that are wrong."""
-        examination = examine(measurements)
+        examination = examine(measurements, by_joints=self._by_joints)
         kept = examination.measurements.views
         if self._learning is None or len(kept) == len(measurements):
             return examination
-        return examine(self._with(measurements.views, kept))
+        return examine(self._with(measurements.views, kept), by_joints=self._by_joints)
 
     def end(self) -> End:
         """End here, because somebody says so, with the answer from the views so far."""
@@ -211,12 +216,12 @@ class Session(Stepping[Situation, End]):
         if len(measurements) >= START_VIEWS:
             try:
                 examination = self._examined(measurements)
-            except InputError as error:
-                if reason not in FAILED:
-                    raise
+                estimate = self._estimator(examination.measurements)
+            except (InputError, SolveError) as error:
                 # What all views share may well be why nothing came of the attempts.
-                return End(reason, f"{sentence}; {error.message}", None, None, len(views), len(entries))
-            estimate = self._estimator(examination.measurements)
+                why = reason if reason in FAILED else EndReason.REFUSED
+                said = f"{sentence}; {error.message}"
+                return End(why, said, None, None, len(views), len(entries), error=error)
             if estimate.determined:
                 calibration = calibrate_examined(
                     examination, self._wish.model, kinematics=self._kinematics, height=self._wish.height

@@ -75,7 +75,7 @@ class RecordedChooser:
         options = PlannerOptions(
             policy=self._wish.policy,
             criterion=self._wish.criterion(estimate, situation.measurements),
-            stop_rules=self._wish.rules(),
+            stop_rules=() if situation.goes_on else self._wish.rules(),
             sight=Sight(known=True),
             seed=self._wish.seed,
             travel=self._travel(situation, pool),

@@ -6,13 +6,20 @@ Journal, lock, checks before and after every motion, and going on after a break 
 from dataclasses import dataclass, replace
 
 from handeye.codes import Code
-from handeye.errors import DegenerateError, InputError, SolveError
-from handeye.estimation import RigCalibration, RigEstimate, RigMeasurements, estimate_rig, solve_rig
+from handeye.errors import DegenerateError, HandeyeError, InputError, SolveError
+from handeye.estimation import (
+    Measurements,
+    RigCalibration,
+    RigEstimate,
+    RigMeasurements,
+    estimate_rig,
+    solve_rig,
+)
 from handeye.estimation.faults import examine
 from handeye.estimation.rig_checks import astray, check_tied
 from handeye.estimation.rig_labels import agree_on_labels
 from handeye.session.attempt import Cell
-from handeye.session.deciding import FAILED, EndReason, Halt
+from handeye.session.deciding import FAILED, EndReason
 from handeye.session.entry import Entry, stations_of
 from handeye.session.judging import all_agree
 from handeye.session.loop import FEWEST_EXAMINED
@@ -24,7 +31,10 @@ from handeye.types import RigRecording
 
 @dataclass(frozen=True, eq=False)
 class RigEnd:
-    """How a run ended: the answer if the stations determine one, and what is believed without it."""
+    """How a run ended: the answer if the stations determine one, and what is believed without it.
+
+    `error` says why the stations are refused, where they are.
+    """
 
     reason: EndReason
     sentence: str
@@ -32,6 +42,7 @@ class RigEnd:
     estimate: RigEstimate | None
     stations: int
     attempts: int
+    error: HandeyeError | None = None
 
 
 class RigSession(Stepping[RigSituation, RigEnd]):
@@ -82,11 +93,13 @@ class RigSession(Stepping[RigSituation, RigEnd]):
         stations = len(self._store.recording)
         return self._end(EndReason.BY_HAND, f"ended by hand after {stations} stations")
 
-    def _situation(self) -> RigSituation | Halt:
-        return RigSituation(self._entries(), tuple(stations_of(self._store.entries)), self._believed())
+    def _situation(self) -> RigSituation:
+        stations = tuple(stations_of(self._store.entries))
+        believed, doubtful = self._believed()
+        return RigSituation(self._entries(), stations, believed, doubtful=doubtful)
 
-    def _believed(self) -> RigEstimate | None:
-        """Return what is believed; None while the stations do not determine every camera.
+    def _believed(self) -> tuple[RigEstimate | None, bool]:
+        """Return what is believed, None while the stations do not determine every camera, and if in doubt.
 
         One wrong view would make all the others look uncertain, or keep them from saying anything at all.
         Mistakes are looked for only where a view stands out or nothing is determined: the end of the session
@@ -94,7 +107,7 @@ class RigSession(Stepping[RigSituation, RigEnd]):
         """
         recording = self._store.recording
         if not recording.stations:
-            return None
+            return None, False
         self._measured = RigMeasurements.of(recording, self._measured)
         measurements = agree_on_labels(self._measured)
         estimate = self._estimated(measurements)
@@ -106,18 +119,21 @@ class RigSession(Stepping[RigSituation, RigEnd]):
             and (estimate is None or not all_agree(measured, estimate.of_pair(*pair)))
         ]
         try:
-            cleared = {pair: examine(measured).measurements for pair, measured in doubtful}
+            cleared = {pair: self._examined(measured) for pair, measured in doubtful}
         except InputError:
-            return estimate  # Shared by all of them; said at the end.
+            return estimate, True
         if all(len(cleared[pair]) == len(measured) for pair, measured in doubtful):
-            return estimate
+            return estimate, False
         left_out = astray((measured, cleared[pair]) for pair, measured in doubtful)
         kept = {
             pair: measured.without(left_out, "the arm stood elsewhere")
             for pair, measured in {**measurements.pairs, **cleared}.items()
         }
         kept = {pair: measured for pair, measured in kept.items() if len(measured) > 0}
-        return self._estimated(replace(measurements, pairs=kept))
+        return self._estimated(replace(measurements, pairs=kept)), False
+
+    def _examined(self, measured: Measurements) -> Measurements:
+        return examine(measured, by_joints=self._kinematics is not None).measurements
 
     def _estimated(self, measurements: RigMeasurements) -> RigEstimate | None:
         try:
@@ -129,14 +145,13 @@ class RigSession(Stepping[RigSituation, RigEnd]):
 
     def _end(self, reason: EndReason, sentence: str) -> RigEnd:
         stations, attempts = len(self._store.recording), len(self._store.entries)
-        believed = self._believed()
-        calibration = None
+        believed, _ = self._believed()
+        calibration, refused = None, None
         if believed is not None:
             try:
                 calibration = solve_rig(self._store.recording, kinematics=self._kinematics)
-            except InputError as error:
-                if reason not in FAILED:
-                    raise
+            except (InputError, SolveError, DegenerateError) as error:
                 # What all views share may well be why nothing came of the attempts.
-                sentence = f"{sentence}; {error.message}"
-        return RigEnd(reason, sentence, calibration, believed, stations, attempts)
+                reason = reason if reason in FAILED else EndReason.REFUSED
+                sentence, refused = f"{sentence}; {error.message}", error
+        return RigEnd(reason, sentence, calibration, believed, stations, attempts, refused)

@@ -21,7 +21,7 @@ from handeye.robots import Arm, ArmKinematics
 from handeye.robots.protocol import Goal
 from handeye.session.deciding import Attempts, Considered, EndReason, Halt, Step
 from handeye.session.safety import body_of
-from handeye.session.starting import LARGEST_TILT_RAD, Start, largest_tilt_rad, starting_goal
+from handeye.session.starting import LARGEST_TILT_RAD, Start, largest_tilt_rad, once_more, starting_goal
 from handeye.session.wish import Wish
 from handeye.types import Pose, RigRecording, Station
 from handeye.types.arrays import FloatArray
@@ -51,6 +51,16 @@ class RigSituation(Attempts):
 
     stations: tuple[Station, ...]
     believed: RigEstimate | None
+
+    @property
+    def taken(self) -> int:
+        """Return how many stations count."""
+        return len(self.stations)
+
+    @property
+    def is_open(self) -> bool:
+        """Tell whether the stations are in doubt or do not determine every camera."""
+        return self.doubtful or self.believed is None
 
 
 class RigChooser:
@@ -102,12 +112,14 @@ class RigChooser:
     def choose(self, situation: RigSituation) -> Step | Halt:
         """Return the next step, or why there is none."""
         count, believed = len(situation.stations), situation.believed
-        if believed is not None and self._met(believed, count):
+        if believed is not None and not situation.doubtful and self._met(believed, count):
             reached = f"with 95 % probability {_reached(believed, self._wish)}, as asked"
             return Halt(EndReason.ACCURACY_REACHED, reached)
-        if count >= self._wish.most_views:
+        if not situation.is_open and count >= self._wish.most_views:
             return Halt(EndReason.VIEWS_TAKEN, f"{count} stations taken, as asked")
-        halt = situation.too_many(self._wish.failures_in_a_row)
+        halt = situation.too_many(self._wish.failures_in_a_row) or situation.full(
+            self._wish.most_views, "stations"
+        )
         if halt is not None:
             return halt
         last = situation.to_repeat(self._wish.tries_at_a_place)
@@ -134,6 +146,10 @@ class RigChooser:
             if (one.camera, one.target) in seen[0]
         ]
         number, failures = _turns(seen)
+        cameras = self._recording.cameras
+        blind = [name for name in cameras if all(name != c for pairs in seen for c, _ in pairs)]
+        if not blind:
+            number, failures = once_more(number, failures)
         found = starting_goal(
             self._start,
             number,
@@ -143,8 +159,6 @@ class RigChooser:
             situation.standing(self._start),
         )
         if found is None:
-            cameras = self._recording.cameras
-            blind = [name for name in cameras if all(name != c for pairs in seen for c, _ in pairs)]
             return Halt(
                 EndReason.NO_START,
                 f"not tied to the arm by turns about where it stands: {', '.join(blind or cameras)}; "

@@ -93,6 +93,14 @@ def starting_goal(
     return None
 
 
+def once_more(number: int, failures: int) -> tuple[int, int]:
+    """Return number and failures for `starting_goal` that go through all turns again, smaller every time."""
+    if number < MOST_VIEWS:
+        return number, failures
+    rounds, turn = divmod(number - 1, MOST_VIEWS - 1)
+    return turn + 1, failures + 2 * rounds
+
+
 def _turned(arm: Arm, start: Start, twist: FloatArray) -> FloatArray | None:
     """Joints (n,) at which the flange is turned by a twist; with few joints, as near to that as they come."""
     if len(arm) < TILTING:

@@ -38,6 +38,7 @@ class Stepping(ABC, Generic[S, E]):
         self._decide = choose
         self._taker = Taker(cell, store)
         self._forgiven_up_to: int | None = None
+        self._granted = 0
 
     @property
     @abstractmethod
@@ -101,16 +102,22 @@ class Stepping(ABC, Generic[S, E]):
         return tuple(entry for entry in self._attempts.entries if entry.withdraws is None)
 
     def _choose(self, situation: S) -> Step | Halt:
-        """Choose; a session that had ended in failures when it was opened gets as many attempts again."""
+        """Choose; a session that had ended without an answer when it was opened gets as much again.
+
+        That is as many attempts where it had ended in failures, else as many views.
+        """
         if self._forgiven_up_to is None:
             self._forgiven_up_to = 0
-            if situation.missed:
-                first = self._decide(situation)
-                if not isinstance(first, Halt) or first.reason not in FAILED:
-                    return first
+            first = self._decide(situation)
+            failed = isinstance(first, Halt) and first.reason in FAILED
+            if failed and situation.missed:
                 self._forgiven_up_to = situation.entries[-1].number
+            elif isinstance(first, Halt) and not failed and situation.is_open:
+                self._granted = situation.taken
+            else:
+                return first
         forgiven = sum(1 for entry in situation.missed if entry.number <= self._forgiven_up_to)
-        return self._decide(replace(situation, forgiven=forgiven))
+        return self._decide(replace(situation, forgiven=forgiven, granted=self._granted))
 
     def take(self, step: Step) -> Entry:
         """Do a step, and write down what it brought.

@@ -5,7 +5,7 @@ best are explained like the recording as given. One is named if its evidence is 
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from handeye.estimation.faults.consensus import closed_forms, distances
 from handeye.estimation.faults.explanation import BEARABLE_SCALE, Explanation, explain
 from handeye.estimation.faults.kinds import (
     HYPOTHESES,
+    OF_NUMBERS,
     Hypothesis,
     SharedFaultError,
     board_size,
@@ -61,14 +62,20 @@ class Alternative:
     rivals: tuple[Hypothesis, ...] = ()
 
 
-def find_alternative(measurements: Measurements, given: Explanation | None) -> Alternative | None:
-    """Find another way to understand all views that explains them much better, None if there is none."""
+def find_alternative(
+    measurements: Measurements, given: Explanation | None, *, by_joints: bool = False
+) -> Alternative | None:
+    """Find another way to understand all views that explains them much better, None if there is none.
+
+    Where the poses are those of the joints, how they are written is not in question.
+    """
     compared = given is not None and given.has_evidence
     needed = given.log_evidence + CLEARLY_BETTER if given is not None and compared else -math.inf
     if given is not None and given.is_convincing:
         tried = _even_so(measurements)
     else:
-        tried = [*_promising(measurements), *_paired(measurements, given)]
+        told = [h for h in HYPOTHESES if not (by_joints and h in OF_NUMBERS)]
+        tried = [*_promising(measurements, told), *_paired(measurements, given)]
     found: list[Alternative] = []
     for hypothesis in tried:
         try:
@@ -180,7 +187,9 @@ def _even_so(measurements: Measurements) -> list[Hypothesis]:
     return [*backwards, *board_size.hypotheses(measurements, smallest=BEARABLE_SCALE)]
 
 
-def _promising(measurements: Measurements) -> list[Hypothesis]:
+def _promising(
+    measurements: Measurements, makers: Sequence[Callable[[Measurements], Iterator[Hypothesis]]]
+) -> list[Hypothesis]:
     """Return the hypotheses under which X and Y in closed form miss least, of equals the more usual."""
     limit = BETTER_SHARE * _misfit(measurements.motions, measurements.camera_poses, measurements)
     ranked: list[tuple[float, float, int, Hypothesis]] = []
@@ -189,7 +198,7 @@ def _promising(measurements: Measurements) -> list[Hypothesis]:
     # readings of the rotations are left then.
     seen = _turns(measurements.camera_poses)
     slack = max(TURN_SLACK_RAD, BETTER_SHARE * _median_gap(_turns(robot), seen))
-    every = (h for hypotheses in HYPOTHESES for h in hypotheses(measurements))
+    every = (hypothesis for hypotheses in makers for hypothesis in hypotheses(measurements))
     for number, hypothesis in enumerate(every):
         try:
             if hypothesis.poses is not None:

@@ -74,8 +74,16 @@ def measured(recording: Recording) -> Measurements:
     return measurements
 
 
-def examine(measurements: Measurements) -> Examination:
+def examine(measurements: Measurements, *, by_joints: bool = False) -> Examination:
     """Find the mistakes in measurements.
+
+    Parameters
+    ----------
+    measurements
+        The views.
+    by_joints
+        Whether the poses are those of the joints, by the description of the arm: then they cannot be
+        written in another way than they are read.
 
     Raises
     ------
@@ -98,7 +106,7 @@ def examine(measurements: Measurements) -> Examination:
     explanation = _explained(measurements)
     if explanation is None or not explanation.is_convincing:
         examine_pictures(measurements, closely=True)
-    alternative = find_alternative(measurements, explanation)
+    alternative = find_alternative(measurements, explanation, by_joints=by_joints)
     explanation = refuse_alternative(measurements, explanation, alternative)
     examination = _sort_out(measurements, explanation)
     return replace(examination, findings=(*findings, *examination.findings))

@@ -50,6 +50,8 @@ HYPOTHESES = (
     mirrored_pictures.hypotheses,
     board_size.hypotheses,
 )
+# Of these, what numbers of a pose may be misread as.
+OF_NUMBERS = (wrong_unit.hypotheses, wrong_rotation.hypotheses)
 CODES = frozenset(kind.code for kind in KINDS)
 
 
@@ -58,4 +60,14 @@ def kind_of(code: str) -> Kind | None:
     return next((kind for kind in KINDS if kind.code == code), None)
 
 
-__all__ = ["CODES", "HYPOTHESES", "KINDS", "Handling", "Hypothesis", "Kind", "SharedFaultError", "kind_of"]
+__all__ = [
+    "CODES",
+    "HYPOTHESES",
+    "KINDS",
+    "OF_NUMBERS",
+    "Handling",
+    "Hypothesis",
+    "Kind",
+    "SharedFaultError",
+    "kind_of",
+]
