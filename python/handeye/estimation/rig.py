@@ -21,7 +21,7 @@ from handeye.estimation.confidence import Within, within
 from handeye.estimation.estimate import Estimate
 from handeye.estimation.faults import Examination
 from handeye.estimation.measurements import Measurements
-from handeye.estimation.rig_checks import check_tied, examine_rig
+from handeye.estimation.rig_checks import check_constants, check_tied, examine_rig
 from handeye.estimation.rig_labels import agree_on_labels
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
 from handeye.estimation.rig_observability import undetermined_rig
@@ -302,7 +302,7 @@ def estimate_rig(
         Fewer than three stations, a camera that nothing ties to the arm, or views without joints that the arm
         needs.
     SolveError
-        The views contradict one another: no camera is as they would have it.
+        The views contradict one another: no camera or board is as they would have it.
 
     Examples
     --------
@@ -314,7 +314,7 @@ def estimate_rig(
     if previous is not None:
         start = (np.asarray(previous.fit.posterior.x), np.asarray(previous.fit.posterior.y))
     fit = fit_cell(measurements, kinematics, camera_fixed=camera_fixed, start=start)
-    _ = fit.cameras  # raises where one is no camera any more
+    check_constants(fit)
     sigmas = np.concatenate([pixels.sigma_px for pixels in fit.pixels.values()])
     noise = noise_of(fit.posterior, fit.measurements.whole, fit.arm, sigmas)
     return RigEstimate(fit, noise, undetermined_rig(fit, noise), attribution_of(fit, noise))

@@ -2,15 +2,19 @@
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 from handeye.codes import Code
-from handeye.errors import HandeyeError, InputError
+from handeye.errors import HandeyeError, InputError, SolveError
+from handeye.estimation.cell_fit import CellFit
 from handeye.estimation.faults import Examination, examine
+from handeye.estimation.faults.explanation import BEARABLE_ALONE, camera_is_bearable, scale_is_bearable
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
 from handeye.types.rig import Body
 
 FEWEST_STATIONS = 3
+ELSEWHERE = "the arm stood elsewhere, as other cameras saw"
 
 
 def check_tied(measurements: RigMeasurements) -> None:
@@ -59,12 +63,50 @@ def check_tied(measurements: RigMeasurements) -> None:
             )
 
 
-def examine_rig(measurements: RigMeasurements, *, by_joints: bool = False) -> dict[Pair, Examination]:
+def check_constants(fit: CellFit) -> None:
+    """Raise where a camera or board would have to be as none that is stated can be.
+
+    Raises
+    ------
+    SolveError
+        The message names it.
+    """
+    advice = "check the motions, and the files of camera and target"
+    for name, camera in fit.cameras.items():
+        prior = fit.priors[name]
+        if not camera_is_bearable(fit.theta[fit.rows_of_camera(name)], prior, BEARABLE_ALONE):
+            raise SolveError(
+                f"the views contradict one another: camera {name} would have a focal length of "
+                f"{camera.parameters[0]:.0f} px, and {prior.camera.parameters[0]:.0f} px are stated",
+                hint=advice,
+            )
+    for name in fit.measurements.targets:
+        scale = float(fit.theta[fit.row_of_board(name)])
+        if not scale_is_bearable(scale, BEARABLE_ALONE):
+            size = "larger" if scale > 0 else "smaller"
+            raise SolveError(
+                f"the views contradict one another: target {name} would be {100 * abs(scale):.0f} % {size} "
+                "than stated",
+                hint=advice,
+            )
+
+
+def examine_rig(
+    measurements: RigMeasurements, *, by_joints: bool = False, fewest: int = FEWEST_STATIONS
+) -> dict[Pair, Examination]:
     """Look for mistakes in what each camera saw of each target that the arm moves against it.
 
-    Few views of a pair cannot tell which of them is wrong. Where they contradict one another, those of
-    stations are left out at which the arm stood elsewhere by what several other pairs say. `by_joints` is
-    that of `examine`.
+    Stations at which the arm stood elsewhere by what several pairs say are left out of all of them: few views
+    of a pair cannot tell which of them is wrong.
+
+    Parameters
+    ----------
+    measurements
+        Of all cameras and targets.
+    by_joints
+        As for `examine`.
+    fewest
+        Pairs of fewer views are not examined.
 
     Raises
     ------
@@ -74,17 +116,20 @@ def examine_rig(measurements: RigMeasurements, *, by_joints: bool = False) -> di
     found: dict[Pair, Examination] = {}
     failed: dict[Pair, HandeyeError] = {}
     for pair, measured in measurements.pairs.items():
-        if not measurements.moves(*pair) or len(measured) < FEWEST_STATIONS:
+        if not measurements.moves(*pair) or len(measured) < fewest:
             found[pair] = Examination(measured)
             continue
         try:
             found[pair] = examine(measured, by_joints=by_joints)
         except HandeyeError as error:
             failed[pair] = error
-    if failed:
-        left_out = astray((measurements.pairs[pair], one.measurements) for pair, one in found.items())
-        for pair, error in failed.items():
-            found[pair] = _without(left_out, measurements, pair, error, by_joints=by_joints)
+    left_out = astray((measurements.pairs[pair], one.measurements) for pair, one in found.items())
+    for pair, one in found.items():
+        gone = left_out & {view.name for view in one.measurements.views}
+        if gone and measurements.moves(*pair):
+            found[pair] = replace(one, measurements=one.measurements.without(gone, ELSEWHERE))
+    for pair, error in failed.items():
+        found[pair] = _without(left_out, measurements, pair, error, by_joints=by_joints)
     return {pair: found[pair] for pair in measurements.pairs}
 
 
@@ -120,7 +165,7 @@ def _without(
 ) -> Examination:
     """Examine a pair whose views contradict one another without some stations."""
     measured = measurements.pairs[pair]
-    rest = measured.without(left_out, "the arm stood elsewhere, as other cameras saw")
+    rest = measured.without(left_out, ELSEWHERE)
     try:
         if len(rest) == len(measured):
             raise error

@@ -8,15 +8,13 @@ from dataclasses import dataclass, replace
 from handeye.codes import Code
 from handeye.errors import DegenerateError, HandeyeError, InputError, SolveError
 from handeye.estimation import (
-    Measurements,
     RigCalibration,
     RigEstimate,
     RigMeasurements,
     estimate_rig,
     solve_rig,
 )
-from handeye.estimation.faults import examine
-from handeye.estimation.rig_checks import astray, check_tied
+from handeye.estimation.rig_checks import check_tied, examine_rig
 from handeye.estimation.rig_labels import agree_on_labels
 from handeye.session.attempt import Cell
 from handeye.session.deciding import FAILED, EndReason
@@ -111,29 +109,22 @@ class RigSession(Stepping[RigSituation, RigEnd]):
         self._measured = RigMeasurements.of(recording, self._measured)
         measurements = agree_on_labels(self._measured)
         estimate = self._estimated(measurements)
-        doubtful = [
-            (pair, measured)
+        if all(
+            estimate is not None and all_agree(measured, estimate.of_pair(*pair))
             for pair, measured in measurements.pairs.items()
-            if len(measured) >= FEWEST_EXAMINED
-            and measurements.moves(*pair)
-            and (estimate is None or not all_agree(measured, estimate.of_pair(*pair)))
-        ]
-        try:
-            cleared = {pair: self._examined(measured) for pair, measured in doubtful}
-        except InputError:
-            return estimate, True
-        if all(len(cleared[pair]) == len(measured) for pair, measured in doubtful):
+            if len(measured) >= FEWEST_EXAMINED and measurements.moves(*pair)
+        ):
             return estimate, False
-        left_out = astray((measured, cleared[pair]) for pair, measured in doubtful)
-        kept = {
-            pair: measured.without(left_out, "the arm stood elsewhere")
-            for pair, measured in {**measurements.pairs, **cleared}.items()
-        }
-        kept = {pair: measured for pair, measured in kept.items() if len(measured) > 0}
+        try:
+            examined = examine_rig(
+                measurements, by_joints=self._kinematics is not None, fewest=FEWEST_EXAMINED
+            )
+        except HandeyeError:
+            return estimate, True
+        kept = {pair: one.measurements for pair, one in examined.items() if len(one.measurements) > 0}
+        if all(len(kept.get(pair, ())) == len(measured) for pair, measured in measurements.pairs.items()):
+            return estimate, False
         return self._estimated(replace(measurements, pairs=kept)), False
-
-    def _examined(self, measured: Measurements) -> Measurements:
-        return examine(measured, by_joints=self._kinematics is not None).measurements
 
     def _estimated(self, measurements: RigMeasurements) -> RigEstimate | None:
         try:

@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handeye.errors import HandeyeError
+from handeye.estimation.camera_prior import CameraPrior
 from handeye.estimation.faults.agreement import BoolArray
 from handeye.estimation.faults.consensus import consensus_as_labelled, find_consensus
 from handeye.estimation.faults.relabel import Readings
 from handeye.estimation.faults.selection import LOG_MISTAKE, Selection, select
 from handeye.estimation.faults.stations import Stations
 from handeye.estimation.measurements import Measurements
-from handeye.types.arrays import IndexArray
+from handeye.types.arrays import FloatArray, IndexArray
 
 # An explanation that needs no other: all views belong, and the robot (metres, radians) is no worse. A wrong
 # reading of the poses can make three of four views agree to a few millimetres.
@@ -98,9 +99,9 @@ class Explanation:
     def constants_are_bearable(self, times: float = 1.0) -> bool:
         """Tell whether board and camera are about as they are stated, or within so many times of that."""
         fit, camera = self.selection.fit, self.stations.camera
-        shift = fit.camera_shift[np.array(camera.free, dtype=int) < PINHOLE_PARAMETERS]
-        limit = times * BEARABLE_CAMERA * camera.camera.parameters[0]
-        return abs(fit.board_scale) < times * BEARABLE_SCALE and bool((np.abs(shift) < limit).all())
+        return scale_is_bearable(fit.board_scale, times) and camera_is_bearable(
+            fit.camera_shift, camera, times
+        )
 
     def _within(self, share: float, fewest: int, levels: tuple[float, float]) -> bool:
         """Tell whether so many of the views agree, and within these levels."""
@@ -108,6 +109,17 @@ class Explanation:
         needed = max(share * count, min(count, fewest))
         translation, rotation = self.levels
         return int(self.members.sum()) >= needed and translation <= levels[0] and rotation <= levels[1]
+
+
+def scale_is_bearable(scale: float, times: float = 1.0) -> bool:
+    """Tell whether a healthy board is off its size by such a share."""
+    return abs(scale) < times * BEARABLE_SCALE
+
+
+def camera_is_bearable(shift: FloatArray, prior: CameraPrior, times: float = 1.0) -> bool:
+    """Tell whether a healthy camera is off by so much in its free parameters."""
+    shift = shift[np.array(prior.free, dtype=int) < PINHOLE_PARAMETERS]
+    return bool((np.abs(shift) < times * BEARABLE_CAMERA * prior.camera.parameters[0]).all())
 
 
 def explain(measurements: Measurements) -> Explanation:
