@@ -69,10 +69,11 @@ def test_the_session_goes_on_without_them(
 
 # Seed, share of the way, first view that lies: the views contradict one another, or leave a direction open.
 @pytest.mark.parametrize(
-    ("seed", "share", "first"), [(100, 0.5, 2), (105, 0.5, 3), (100, 0.9, 2), (106, 0.9, 3)]
+    ("seed", "share", "first", "too_early"),
+    [(100, 0.5, 2, 0), (100, 0.5, 2, 1), (105, 0.5, 3, 0), (100, 0.9, 2, 0), (106, 0.9, 3, 0)],
 )
 def test_a_session_that_ended_without_an_answer_goes_on_when_the_robot_is_put_right(
-    seed: int, share: float, first: int, tmp_path: Path
+    seed: int, share: float, first: int, too_early: int, tmp_path: Path
 ) -> None:
     prepared = prepare(configured(seed, accuracy_mm=0.05, accuracy_deg=0.005, most_views=6))
     lying = Lying(prepared.cell.robot, range(first, 100), share)
@@ -84,10 +85,17 @@ def test_a_session_that_ended_without_an_answer_goes_on_when_the_robot_is_put_ri
     assert (end.error is not None) == (end.reason is EndReason.REFUSED)
     # What the arm's description and its joints agree on is no matter of how angles are written.
     assert end.error is None or end.error.code == "inconsistent"
+    for _ in range(too_early):
+        _, store, prepared = go_on(tmp_path / "s")
+        lying = Lying(prepared.cell.robot, range(first, 100), share)
+        end = replace(prepared, cell=replace(prepared.cell, robot=lying)).session(store).run()
+        store.close()
+        assert end.calibration is None
+    before = end.views
     session, store, prepared = go_on(tmp_path / "s")
     end = session.run()
     store.close()
-    assert end.views <= 12
+    assert before < end.views <= 2 * before + 1
     assert end.calibration is not None
     assert end.reach is not None
     assert prepared.truth is not None

@@ -29,7 +29,7 @@ from handeye.session.deciding import (
     halt_of,
 )
 from handeye.session.entry import TRANSIENT, Entry, Failure
-from handeye.session.starting import MOST_VIEWS, Start, largest_tilt_rad, once_more, starting_goal
+from handeye.session.starting import Start, largest_tilt_rad, once_more, starting_goal
 from handeye.session.wish import Wish
 from handeye.types import Camera, Pose
 
@@ -96,7 +96,7 @@ class ArmChooser:
             return Step(goal, "retry", {"after": last.number}, None if situation.doubtful else estimate)
         if estimate is None:
             return self._starting(situation)
-        if situation.doubtful and len(situation.views) < MOST_VIEWS:
+        if situation.doubtful:
             # What is seen around the start is judged by no belief, and tells which of the views are wrong.
             step = self._starting(replace(situation, estimate=None))
             if isinstance(step, Step):
@@ -201,8 +201,10 @@ class ArmChooser:
                 pose = answer.candidate.T_base_flange
                 goal = self._goal(situation, pose, tuple(joints_of[name].tolist()))
                 considered = Considered(planner.pool, planner.gains(), drawn.ruled_out, drawn.reasons)
+                # What is in doubt judges no view.
+                believed = None if situation.doubtful else estimate
                 return Step(
-                    goal, "plan", decision_of(answer, estimate, more), estimate, considered=considered
+                    goal, "plan", decision_of(answer, estimate, more), believed, considered=considered
                 )
             turned_down[f"on the way: {why}"] = turned_down.get(f"on the way: {why}", 0) + 1
             planner.give_up(name)

@@ -57,16 +57,16 @@ class Attempts(ABC):
     forgiven
         How many of the attempts since the last view do not count any more: the session ended with them, and
         was told to go on.
-    granted
-        How many views or stations may be taken beyond those asked for while there is no answer: the session
-        ended without one, and was told to go on.
+    outvoted
+        How many views or stations there were when the session, which had ended without an answer, was told to
+        go on: new ones may be taken until they are the more.
     doubtful
         Whether what was seen contradicts itself so that nobody can say yet which of it is wrong.
     """
 
     entries: tuple[Entry, ...]
     forgiven: int = field(default=0, kw_only=True)
-    granted: int = field(default=0, kw_only=True)
+    outvoted: int = field(default=0, kw_only=True)
     doubtful: bool = field(default=False, kw_only=True)
 
     @property
@@ -82,7 +82,7 @@ class Attempts(ABC):
     @property
     def goes_on(self) -> bool:
         """Tell whether no promise of accuracy is to be believed: only the number of views ends it."""
-        return self.doubtful or (self.granted > 0 and self.is_open)
+        return self.doubtful or (self.outvoted > 0 and self.is_open)
 
     @cached_property
     def missed(self) -> list[Entry]:
@@ -139,7 +139,7 @@ class Attempts(ABC):
 
     def full(self, most: int, what: str) -> "Halt | None":
         """Return that as many were taken as asked for, without an answer; None if they are fewer."""
-        if not self.is_open or self.taken < most + self.granted:
+        if not self.is_open or self.taken < max(most, 2 * self.outvoted + 1):
             return None
         return Halt(EndReason.VIEWS_TAKEN, f"{self.taken} {what} taken, as asked")
 

@@ -38,7 +38,7 @@ class Stepping(ABC, Generic[S, E]):
         self._decide = choose
         self._taker = Taker(cell, store)
         self._forgiven_up_to: int | None = None
-        self._granted = 0
+        self._outvoted = 0
 
     @property
     @abstractmethod
@@ -104,20 +104,22 @@ class Stepping(ABC, Generic[S, E]):
     def _choose(self, situation: S) -> Step | Halt:
         """Choose; a session that had ended without an answer when it was opened gets as much again.
 
-        That is as many attempts where it had ended in failures, else as many views.
+        That is as many attempts after failures, and views until they outvote those that give no answer.
         """
         if self._forgiven_up_to is None:
             self._forgiven_up_to = 0
-            first = self._decide(situation)
-            failed = isinstance(first, Halt) and first.reason in FAILED
-            if failed and situation.missed:
+            answer = self._decide(situation)
+            if isinstance(answer, Halt) and answer.reason in FAILED and situation.missed:
                 self._forgiven_up_to = situation.entries[-1].number
-            elif isinstance(first, Halt) and not failed and situation.is_open:
-                self._granted = situation.taken
-            else:
-                return first
-        forgiven = sum(1 for entry in situation.missed if entry.number <= self._forgiven_up_to)
-        return self._decide(replace(situation, forgiven=forgiven, granted=self._granted))
+                answer = self._decide(self._forgiving(situation))
+            if isinstance(answer, Step) or answer.reason in FAILED or not situation.is_open:
+                return answer
+            self._outvoted = situation.taken
+        return self._decide(self._forgiving(situation))
+
+    def _forgiving(self, situation: S) -> S:
+        forgiven = sum(1 for entry in situation.missed if entry.number <= (self._forgiven_up_to or 0))
+        return replace(situation, forgiven=forgiven, outvoted=self._outvoted)
 
     def take(self, step: Step) -> Entry:
         """Do a step, and write down what it brought.
