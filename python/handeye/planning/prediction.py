@@ -15,7 +15,7 @@ from handeye.types.pose import Pose
 SIGMA_POINT_DIRECTIONS = 4
 # Points that stand for a target where a first ranking is enough.
 COARSE_POINTS = 16
-# Candidates whose covariances are held in memory at a time.
+# Candidates whose covariances, or errors of whose arms, are held in memory at a time.
 _BATCH = 1000
 
 
@@ -121,8 +121,13 @@ class Prediction:
         # What the arm does, and what a view tells of the camera, is asked only where it shows the target.
         gains = np.full(len(motions), np.nan)
         seen = np.flatnonzero(self.in_sight(motions))
-        arm = self._arm(None if joints is None else joints[seen])
-        gains[seen] = self._predictor.gains(self._belief, criterion, motions[seen], arm=arm)
+        if joints is None or self.estimate.arm is None:
+            gains[seen] = self._predictor.gains(self._belief, criterion, motions[seen])
+            return gains
+        for first in range(0, len(seen), _BATCH):
+            part = seen[first : first + _BATCH]
+            arm = self._arm(joints[part])
+            gains[part] = self._predictor.gains(self._belief, criterion, motions[part], arm=arm)
         return gains
 
     def informations(self, motions: FloatArray, joints: FloatArray | None = None) -> FloatArray:

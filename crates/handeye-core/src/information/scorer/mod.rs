@@ -13,6 +13,7 @@ mod block;
 mod distorted;
 mod forms;
 mod pinhole;
+mod sight;
 mod target;
 #[cfg(test)]
 mod test_scene;
@@ -30,6 +31,7 @@ use self::block::{BLOCK, Block, Row};
 use self::distorted::Distorted;
 use self::forms::{Arm, Entropies, Form, Observed, packed, predicted, robot_only};
 use self::pinhole::Pinhole;
+pub(super) use self::sight::in_sight;
 use self::target::Target;
 use self::wide_algebra::{Outcome, Wide};
 use self::wide_points::{Column, WidePoints};
@@ -354,19 +356,6 @@ impl<'a> Scorer<'a> {
             dispatch(self.unit, Wide::<23, 276> { scale, form, rows, block, outcome });
         }
     }
-}
-
-/// Which motions would show enough of the target.
-pub(super) fn in_sight(
-    model: &CandidateModel<'_>,
-    motions: Motions<'_>,
-    execution: &Execution,
-) -> Result<Vec<bool>, Error> {
-    // What a view tells of camera and board has no say in what it shows.
-    let model = CandidateModel { pixel_parameters: None, ..model.clone() };
-    let mut seen = vec![0.0; motions.len()];
-    Scorer::without_goal(&model, execution.unit).score(motions, None, execution, &mut seen)?;
-    Ok(seen.iter().map(|seen| !seen.is_nan()).collect())
 }
 
 /// The pixel parameters in the order of their columns.
