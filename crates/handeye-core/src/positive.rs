@@ -56,22 +56,25 @@ impl Factor {
 
     /// `m^-1 right`.
     pub fn solve(&self, right: &[f64]) -> Vec<f64> {
-        let rows: Vec<&[f64]> = self.upper.chunks_exact(self.blocks).map(<[Block]>::as_flattened).collect();
-        let mut solution = right.to_vec();
-        for k in 0..self.size {
-            let value = solution[k] / rows[k][k];
-            for i in k + 1..self.size {
-                solution[i] -= rows[k][i] * value;
+        let mut left = vec![[0.0; MAX_LANES]; self.blocks];
+        left.as_flattened_mut()[..self.size].copy_from_slice(right);
+        let mut solution = vec![[0.0; MAX_LANES]; self.blocks];
+        dispatch(self.unit, Solve { factor: self, left: &mut left, solution: &mut solution });
+        solution.as_flattened()[..self.size].to_vec()
+    }
+
+    /// `R` with `R R' = m^-1`: `D^-1/2 L^-1`, transposed, row by row in rows of `across`; zero below the diagonal.
+    pub fn inverse_root(&self, across: usize) -> Vec<f64> {
+        let mut lower = vec![[0.0; MAX_LANES]; self.size * self.blocks];
+        dispatch(self.unit, Invert { factor: self, lower: &mut lower, inverse: &mut [] });
+        let mut root = vec![0.0; self.size * across];
+        for (j, (row, pivot)) in lower.chunks_exact(self.blocks).zip(self.pivots()).enumerate() {
+            let scale = 1.0 / pivot.sqrt();
+            for (i, entry) in row.as_flattened()[..=j].iter().enumerate() {
+                root[i * across + j] = scale * entry;
             }
         }
-        for k in (0..self.size).rev() {
-            let mut value = solution[k];
-            for i in k + 1..self.size {
-                value -= rows[k][i] * solution[i];
-            }
-            solution[k] = value / rows[k][k];
-        }
-        solution
+        root
     }
 
     /// `m^-1`; not finite where it overflows.
@@ -155,7 +158,42 @@ impl Kernel for Eliminate<'_> {
     }
 }
 
-/// `L^-1` and `(L^-1)' D^-1 L^-1` for `U = D L'`, lower triangles row by row; both zero before.
+/// `m^-1 left`; the solution is zero before.
+struct Solve<'a> {
+    factor: &'a Factor,
+    left: &'a mut [Block],
+    solution: &'a mut [Block],
+}
+
+impl Kernel for Solve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Factor { size, blocks, upper, .. } = self.factor;
+        let mut eliminated = Vec::with_capacity(*size);
+        for (k, row) in upper.chunks_exact(*blocks).enumerate() {
+            let (first, value) = (k / MAX_LANES, self.left.as_flattened()[k]);
+            eliminated.push(value);
+            // What stands before it in its block has been read already.
+            take_off(simd, &mut self.left[first..], [value / row.as_flattened()[k]], [&row[first..]]);
+        }
+        for (k, row) in upper.chunks_exact(*blocks).enumerate().rev() {
+            let mut known = simd.splat(0.0);
+            // What is not known yet is zero.
+            for (row, solution) in row.iter().zip(&*self.solution).skip(k / MAX_LANES) {
+                for at in (0..MAX_LANES).step_by(S::LANES) {
+                    known = simd.load(&row[at..]).mul_add(simd.load(&solution[at..]), known);
+                }
+            }
+            let value = (eliminated[k] - known.sum()) / row.as_flattened()[k];
+            self.solution.as_flattened_mut()[k] = value;
+        }
+    }
+}
+
+/// `L^-1` and, where there is room for it, `(L^-1)' D^-1 L^-1` for `U = D L'`, lower triangles row by row; both zero
+/// before.
 struct Invert<'a> {
     factor: &'a Factor,
     lower: &'a mut [Block],
@@ -206,7 +244,7 @@ impl Kernel for Invert<'_> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::DMatrix;
+    use nalgebra::{DMatrix, DVector};
 
     use super::*;
     use crate::testing::Random;
@@ -228,11 +266,20 @@ mod tests {
             let correlation = &scale * &m * &scale;
             let expected = &scale * correlation.clone().lu().try_inverse().unwrap() * &scale;
             let inverse = factor.inverse();
+            let root = DMatrix::from_row_slice(size, size, &factor.inverse_root(size));
+            let squared = &root * root.transpose();
             for i in 0..size {
                 for j in 0..size {
                     let unit = (expected[(i, i)] * expected[(j, j)]).sqrt();
                     assert!((inverse[(i, j)] - expected[(i, j)]).abs() < 1e-9 * unit);
+                    assert!((squared[(i, j)] - expected[(i, j)]).abs() < 1e-9 * unit);
+                    assert!(i <= j || root[(i, j)] == 0.0);
                 }
+            }
+            let right: Vec<f64> = (0..size).map(|_| random.normal()).collect();
+            let solution = &m * DVector::from_vec(factor.solve(&right));
+            for (i, (a, b)) in solution.iter().zip(&right).enumerate() {
+                assert!((a - b).abs() < 1e-8 * m[(i, i)].sqrt().max(1.0), "{a} {b}");
             }
             let log = correlation.lu().determinant().ln() - 2.0 * scale.diagonal().map(f64::ln).sum();
             assert!((factor.log_determinant() - log).abs() < 1e-9);

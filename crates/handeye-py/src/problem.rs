@@ -103,7 +103,7 @@ impl Problem {
                 .iter()
                 .map(|k| {
                     let pose = x * *self.inner.motion(*k) * y;
-                    view_block(&self.inner, *k, self.inner.camera(), &pose, 1.0, None, None)
+                    view_block(&self.inner, *k, self.inner.camera(), &pose, 1.0)
                         .map_or(f64::INFINITY, |b| b.squared_px)
                 })
                 .sum()

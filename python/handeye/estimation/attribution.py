@@ -4,7 +4,7 @@ Nothing is estimated again. How much each component moves the measurements, in s
 pixels, and by how much the likelihood falls without it come with the posterior.
 """
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,31 +52,30 @@ class Levels:
     @classmethod
     def expected_noise(cls, posterior: _core.Posterior) -> StationNoise:
         """What is new at every station, root mean square over what the levels may be."""
-        nodes = [
-            cls(dict(zip(posterior.level_names, levels, strict=True))).station_noise()
-            for levels in posterior.levels
-        ]
-        weights = np.array(posterior.weights)
-
-        def mean(of: Callable[[StationNoise], float]) -> float:
-            return float(np.sqrt(weights @ np.square([of(node) for node in nodes])))
-
-        return StationNoise(
-            (mean(lambda n: n.flange[0]), mean(lambda n: n.flange[1])),
-            (mean(lambda n: n.base[0]), mean(lambda n: n.base[1])),
-            mean(lambda n: n.joint_rad),
-        )
-
-    def twist(self, name: str) -> tuple[float, float]:
-        """Translation (metres) and rotation (radians) of a component that is a twist."""
-        rotation = self.values.get(f"{name}_rad", 0.0)
-        return rotation * self.values.get(f"{name}_lever_m", 1.0), rotation
+        nodes = [_new(dict(zip(posterior.level_names, levels, strict=True))) for levels in posterior.levels]
+        return _station_noise(np.sqrt(np.array(posterior.weights) @ np.square(nodes)).tolist())
 
     def station_noise(self) -> StationNoise:
         """What is new at every station; smooth errors of the posture count as new at another one."""
-        both = [np.hypot(self.twist(side), self.twist(f"posture_{side}")) for side in ("flange", "base")]
-        flange, base = ((float(t), float(r)) for t, r in both)
-        return StationNoise(flange, base, self.values.get("joint_rad", 0.0))
+        return _station_noise(_new(self.values))
+
+
+def _twist(levels: dict[str, float], name: str) -> tuple[float, float]:
+    """Translation (metres) and rotation (radians) of a component that is a twist."""
+    rotation = levels.get(f"{name}_rad", 0.0)
+    return rotation * levels.get(f"{name}_lever_m", 1.0), rotation
+
+
+def _new(levels: dict[str, float]) -> list[float]:
+    """Translation and rotation at the flange, the same at the base, and the joints, as new at a station."""
+    twists = [(_twist(levels, side), _twist(levels, f"posture_{side}")) for side in ("flange", "base")]
+    both = [math.hypot(white[i], smooth[i]) for white, smooth in twists for i in (0, 1)]
+    return [*both, levels.get("joint_rad", 0.0)]
+
+
+def _station_noise(deviations: list[float]) -> StationNoise:
+    flange_m, flange_rad, base_m, base_rad, joint_rad = deviations
+    return StationNoise((flange_m, flange_rad), (base_m, base_rad), joint_rad)
 
 
 def noise_of(

@@ -222,12 +222,10 @@ def fit_cell(
     arm = None if kinematics is None else ArmModel.of(kinematics)
     touched = None if probing is None else probing_rows(measurements, probing, arm)
     once = partial(_once, arm=arm, touched=touched, play=play)
-    # Where the pixels alone put the cameras, before all else is fitted around them.
     pixels = pixels_of(measurements, priors)
-    for _ in range(MOST_CAMERAS):
-        of_pixels = {name: camera_of_pixels(pixels, name, prior) for name, prior in priors.items()}
-        if not (moved := moved_cameras(priors, of_pixels)):
-            break
+    # To where the pixels alone put the cameras, before all else is fitted around them.
+    of_pixels = {name: camera_of_pixels(pixels, name, prior) for name, prior in priors.items()}
+    if moved := moved_cameras(priors, of_pixels):
         measurements, priors, pixels = _through(measurements, priors, moved)
     fit = once(measurements, priors, pixels, start=start)
     for _ in range(MOST_CAMERAS):

@@ -91,23 +91,6 @@ def view_pose(camera: Camera, target: Target, view: View) -> ViewPose:
     )
 
 
-def _moved(camera: Camera, target: Target, view: View, pose: ViewPose) -> ViewPose:
-    """Refine the poses of one view, which fit through a camera close to this one."""
-    points, radii = target.points[view.point_ids], target.radii_m[view.point_ids]
-
-    def refined(start: Pose) -> tuple[Pose, float, FloatArray]:
-        matrix, rmse_px, information = _core.refine_pose(
-            camera.lens, camera.parameters, points, radii, view.pixels, start.matrix
-        )
-        return Pose(matrix), rmse_px, information
-
-    best = refined(pose.T_camera_target)
-    if pose.mirrored is None:
-        return ViewPose(*best, None)
-    best, other = sorted((best, refined(pose.mirrored[0])), key=lambda fit: fit[1])
-    return ViewPose(*best, other[:2])
-
-
 @dataclass(frozen=True, eq=False)
 class Measurements:
     """Views of one target through one camera, ready to be solved.
@@ -180,13 +163,25 @@ class Measurements:
 
         Every pose is refined from the one it had; where that fails all are found from nothing.
         """
+        mirrored = [(k, pose.mirrored[0]) for k, pose in enumerate(self.poses) if pose.mirrored is not None]
+        starts = [(k, pose.T_camera_target) for k, pose in enumerate(self.poses)] + mirrored
+        lens, points, radii = (camera.lens, camera.parameters), self.target.points, self.target.radii_m
+        views = [(points[view.point_ids], radii[view.point_ids], view.pixels) for view in self.views]
         try:
-            moved = tuple(
-                _moved(camera, self.target, *both) for both in zip(self.views, self.poses, strict=True)
-            )
+            fits = [_core.refine_pose(*lens, *views[k], start.matrix) for k, start in starts]
         except HandeyeError:
             return self.through(camera)
-        return replace(self, camera=camera, poses=moved)
+        found = [
+            ViewPose(pose, rmse_px, information, None)
+            for pose, (_, rmse_px, information) in zip(
+                Pose.of_matrices([fit[0] for fit in fits]), fits, strict=True
+            )
+        ]
+        poses = found[: len(self)]
+        for (k, _), other in zip(mirrored, found[len(self) :], strict=True):
+            best, worse = sorted((poses[k], other), key=lambda pose: pose.rmse_px)
+            poses[k] = replace(best, mirrored=(worse.T_camera_target, worse.rmse_px))
+        return replace(self, camera=camera, poses=tuple(poses))
 
     def __len__(self) -> int:
         return len(self.views)

@@ -19,6 +19,8 @@ LEAST_PIXEL_SIGMA = 0.01
 PIXEL_PRIOR_DEGREES = 20.0
 # Beyond this, in pixels anywhere in the image, what was measured through the camera is measured again.
 LARGEST_CAMERA_SHIFT_PX = 2.0
+# Where that is looked at, in shares of the image.
+_GRID = np.stack(np.meshgrid(np.linspace(0, 1, 7), np.linspace(0, 1, 7)), axis=-1).reshape(-1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +118,9 @@ def moved_cameras(priors: Mapping[str, CameraPrior], cameras: Mapping[str, Camer
 
 def _largest_shift_px(before: Camera, after: Camera) -> float:
     """How far pixels move between two cameras of one lens, at most over a grid of rays in the image."""
-    width, height = before.size_px
-    u, v = np.meshgrid(np.linspace(0, width - 1, 7), np.linspace(0, height - 1, 7))
     fx, fy, cx, cy = before.parameters[:4]
-    rays = np.stack([(u.ravel() - cx) / fx, (v.ravel() - cy) / fy, np.ones(u.size)], axis=1)
+    rays = np.ones((len(_GRID), 3))
+    rays[:, :2] = (_GRID * (np.array(before.size_px) - 1) - [cx, cy]) / [fx, fy]
     first, seen = before.project(rays)
     second, still = after.project(rays)
     both = seen & still

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::cell::Cell;
 use super::component::{Component, Effect};
 use super::linearisation::Linearisation;
-use super::mixed::{Mixed, Noise, Prior, Settled, Station};
+use super::mixed::{Mixed, Noise, Prior, Settled, Station, covariances};
 use crate::simd::{MAX_LANES, VectorUnit};
 
 impl Prior {
@@ -91,7 +91,7 @@ impl Mixed {
             }
         }
         let width = (size + 1).next_multiple_of(MAX_LANES);
-        let stations = linearisation
+        let stations: Vec<Station> = linearisation
             .stations
             .iter()
             .enumerate()
@@ -134,6 +134,7 @@ impl Mixed {
             components: owners,
             constants,
             width,
+            covariances: covariances(&stations, &noises, &priors),
             stations,
             noises,
             priors,

@@ -1,6 +1,6 @@
 //! What each component of the error explains.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::mixed::{Mixed, Prior, Wanted};
 
@@ -32,29 +32,28 @@ impl Mixed {
                 }
             }
         };
-        let mut rows = self.settled.rows;
-        for (k, station) in self.stations.iter().enumerate() {
-            rows += station.size;
-            let factor = station.pixels.clone().cholesky()?;
-            for x in &self.noises {
-                let mut root = x.roots[k].clone();
-                factor.l_dirty().solve_lower_triangular_mut(&mut root);
-                add(x.of, Self::deviation(&x.levels, t).powi(2) * root.norm_squared());
-            }
-            for p in &self.priors {
-                let mut moved = if p.recurring {
-                    // What it is here is not told; what it may be is.
-                    station.columns(p, self.width) * Self::deviation(&p.levels, t)
-                } else {
-                    let values = Self::deviation_from(p, theta);
-                    DMatrix::from_column_slice(
-                        station.size,
-                        1,
-                        (station.columns(p, self.width) * values).as_slice(),
-                    )
-                };
-                factor.l_dirty().solve_lower_triangular_mut(&mut moved);
-                add(p.of, moved.norm_squared());
+        let (factors, _) = self.covariances.factorised(self.unit, &vec![0.0; self.noises.len()], None)?;
+        let rows = self.whiten(&factors, |station| &station.rows, self.width);
+        let across = self.roots_across();
+        let roots = self.whiten(&factors, |station| &station.roots, across);
+        let mut first = 0;
+        for x in &self.noises {
+            let range = first..first + x.columns;
+            first = range.end;
+            let squared: f64 =
+                roots.chunks_exact(across).flat_map(|row| &row[range.clone()]).map(|v| v * v).sum();
+            add(x.of, Self::deviation(&x.levels, t).powi(2) * squared);
+        }
+        for p in &self.priors {
+            let of = rows.chunks_exact(self.width).map(|row| &row[p.range()]);
+            if p.recurring {
+                // What it is here is not told; what it may be is.
+                let squared: f64 = of.flatten().map(|v| v * v).sum();
+                add(p.of, Self::deviation(&p.levels, t).powi(2) * squared);
+            } else {
+                let values = Self::deviation_from(p, theta);
+                let moved = |row: &[f64]| row.iter().zip(values.iter()).map(|(b, x)| b * x).sum::<f64>();
+                add(p.of, of.map(|row| moved(row).powi(2)).sum());
             }
         }
         for p in self.priors.iter().filter(|p| !p.recurring) {
@@ -62,8 +61,9 @@ impl Mixed {
             let of = self.settled.information.view((p.first, p.first), (p.count, p.count));
             add(p.of, moved.dot(&(of * &moved)));
         }
+        let count = (self.rows() + self.settled.rows) as f64;
         for (_, sum) in &mut sums {
-            *sum /= rows as f64;
+            *sum /= count;
         }
         Some(sums)
     }

@@ -12,9 +12,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::levels::{Level, LevelPrior};
-use super::products::{Accumulate, TOGETHER, Whiten};
+use super::products::{Accumulate, TOGETHER};
+use super::station_covariances::{StationCovariances, StationFactors, Whiten};
 use crate::positive::Factor;
-use crate::simd::{VectorUnit, dispatch};
+use crate::simd::{MAX_LANES, VectorUnit, dispatch};
 
 /// A prior on parameters.
 #[derive(Clone)]
@@ -66,8 +67,8 @@ pub(super) struct Noise {
 
 /// Rows of all stations in units of their noise.
 pub(super) struct Whitened {
-    /// Cholesky factor of the covariance of each.
-    pub factors: Vec<DMatrix<f64>>,
+    /// Cholesky factors of the covariances.
+    pub factors: StationFactors,
     /// Their rows, one after the other.
     pub rows: Vec<f64>,
 }
@@ -112,11 +113,22 @@ pub(super) struct Mixed {
     pub stations: Vec<Station>,
     pub noises: Vec<Noise>,
     pub priors: Vec<Prior>,
+    /// Of stations, noises and priors as they are here.
+    pub covariances: StationCovariances,
     pub given: DMatrix<f64>,
     pub given_right: DVector<f64>,
     /// Rows whose noise is the same at all levels, summed up in what is given.
     pub settled: Settled,
     pub unit: VectorUnit,
+}
+
+/// Covariances of stations side by side.
+pub(super) fn covariances(stations: &[Station], noises: &[Noise], priors: &[Prior]) -> StationCovariances {
+    StationCovariances::of(
+        &stations.iter().map(|station| &station.pixels).collect::<Vec<_>>(),
+        noises.iter().map(|x| &x.squares[..]),
+        priors.iter().map(|p| &p.squares[..]),
+    )
 }
 
 /// How much of [`Mixed::evaluate`] is wanted.
@@ -140,7 +152,7 @@ pub(super) struct Evaluation {
     pub curvature: DMatrix<f64>,
     /// The parameters.
     pub theta: DVector<f64>,
-    /// Their covariance.
+    /// Their covariance, where an answer was wanted.
     pub covariance: DMatrix<f64>,
     /// Their information under the working model, where an answer was wanted.
     pub information: DMatrix<f64>,
@@ -153,13 +165,18 @@ impl Mixed {
             chosen.iter().filter_map(|k| all.get(*k)).cloned().collect()
         };
         let noise = |x: &Noise| Noise { roots: of(&x.roots), squares: of(&x.squares), ..x.clone() };
+        let stations: Vec<Station> = chosen.iter().map(|k| self.stations[*k].clone()).collect();
+        let noises: Vec<Noise> = self.noises.iter().map(noise).collect();
+        let priors: Vec<Prior> =
+            self.priors.iter().map(|p| Prior { squares: of(&p.squares), ..p.clone() }).collect();
         Self {
             levels: self.levels.clone(),
             components: self.components.clone(),
             constants: self.constants.clone(),
-            stations: chosen.iter().map(|k| self.stations[*k].clone()).collect(),
-            noises: self.noises.iter().map(noise).collect(),
-            priors: self.priors.iter().map(|p| Prior { squares: of(&p.squares), ..p.clone() }).collect(),
+            covariances: covariances(&stations, &noises, &priors),
+            stations,
+            noises,
+            priors,
             given: self.given.clone(),
             given_right: self.given_right.clone(),
             settled: self.settled.clone(),
@@ -193,6 +210,11 @@ impl Mixed {
         let rows = DMatrix::from_fn(station.size, self.size, |i, j| station.rows[i * self.width + j]);
         let e = DVector::from_fn(station.size, |i, _| station.rows[i * self.width + self.size]);
         (noise, e + &rows * theta, &rows * covariance * rows.transpose())
+    }
+
+    /// Width of the roots of all noises side by side.
+    pub fn roots_across(&self) -> usize {
+        self.noises.iter().map(|x| x.columns).sum::<usize>().next_multiple_of(MAX_LANES)
     }
 
     /// Logarithms of the levels to begin with.
@@ -255,7 +277,6 @@ impl Mixed {
         }
         let apart = wanted == Wanted::Answer && self.told < n;
         let covariance = match wanted {
-            Wanted::Slope => factor.inverse(),
             Wanted::Answer if !apart => factor.inverse(),
             _ => DMatrix::zeros(0, 0),
         };
@@ -263,8 +284,10 @@ impl Mixed {
             Evaluation { value, slope, curvature, theta, covariance, information: DMatrix::zeros(0, 0) };
         match wanted {
             Wanted::Value => {}
-            Wanted::Slope => self.differentiate(&whitened, &noise, &prior, &mut evaluation),
-            Wanted::Answer if apart => self.answer_apart(&noise, &prior, &mut evaluation)?,
+            Wanted::Slope => self.differentiate(&whitened, &factor, (&noise, &prior), &mut evaluation),
+            Wanted::Answer if apart => {
+                self.answer_apart(&whitened.factors, &noise, &prior, &mut evaluation)?;
+            }
             Wanted::Answer => {
                 information.fill_upper_triangle_with_lower_triangle();
                 evaluation.information = information;
@@ -297,45 +320,22 @@ impl Mixed {
         constant
     }
 
-    /// All stations' rows, whitened, and the logarithm of the determinant of their covariances; `prior` as in `factor`.
+    /// All stations' rows, whitened, and the logarithm of the determinant of their covariances. With `prior`, recurring
+    /// errors count as new at every station.
     pub fn whitened(&self, noise: &[f64], prior: Option<&[f64]>) -> Option<(Whitened, f64)> {
-        let rows = self.stations.iter().map(|station| station.rows.len()).sum();
-        let mut all =
-            Whitened { factors: Vec::with_capacity(self.stations.len()), rows: Vec::with_capacity(rows) };
-        let mut constant = 0.0;
-        for (k, station) in self.stations.iter().enumerate() {
-            let (factor, log_determinant) = self.factor(station, k, noise, prior)?;
-            constant += log_determinant;
-            let first = all.rows.len();
-            all.rows.extend_from_slice(&station.rows);
-            let rows = &mut all.rows[first..];
-            dispatch(self.unit, Whiten { factor: &factor, rows, width: self.width });
-            all.factors.push(factor);
-        }
-        Some((all, constant))
+        let (factors, log_determinant) = self.covariances.factorised(self.unit, noise, prior)?;
+        let rows = self.whiten(&factors, |station| &station.rows, self.width);
+        Some((Whitened { factors, rows }, log_determinant))
     }
 
-    /// Cholesky factor of a station's covariance, and the logarithm of its determinant. With `prior`, recurring errors
-    /// count as new at the station.
-    fn factor(
-        &self,
-        station: &Station,
-        k: usize,
-        noise: &[f64],
-        prior: Option<&[f64]>,
-    ) -> Option<(DMatrix<f64>, f64)> {
-        let mut covariance = station.pixels.clone();
-        for (x, s) in self.noises.iter().zip(noise) {
-            add(&mut covariance, s * s, &x.squares[k]);
+    /// `L^-1` times rows of all stations.
+    pub fn whiten(&self, factors: &StationFactors, rows: fn(&Station) -> &[f64], width: usize) -> Vec<f64> {
+        let mut out = vec![0.0; self.rows() * width];
+        if width > 0 {
+            let rows: Vec<&[f64]> = self.stations.iter().map(rows).collect();
+            dispatch(self.unit, Whiten { factors, rows: &rows, width, out: &mut out });
         }
-        if let Some(prior) = prior {
-            for (p, s) in self.priors.iter().zip(prior).filter(|(p, _)| p.recurring) {
-                add(&mut covariance, s * s, &p.squares[k]);
-            }
-        }
-        let factor = covariance.cholesky()?.unpack();
-        let log_determinant = 2.0 * factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
-        Some((factor, log_determinant))
+        out
     }
 }
 

@@ -31,6 +31,7 @@ mod reduction;
 mod sandwich;
 mod slopes;
 mod start;
+mod station_covariances;
 mod systems;
 mod twists;
 mod weak_prior;

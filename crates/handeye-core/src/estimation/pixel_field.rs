@@ -4,15 +4,15 @@
 //! follow beyond pose and camera, has the same power as the rest. Where neighbours err alike it has more, and so has
 //! what the pose takes up: the covariance of the pose grows by the same factor.
 
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
+
 use super::products::{Accumulate, TOGETHER};
 use crate::camera::Camera;
-use crate::least_squares::{PixelParameters, Problem};
+use crate::least_squares::{PixelColumns, PixelParameters, Problem, ViewBlock};
 use crate::se3::Se3;
 use crate::simd::{MAX_LANES, VectorUnit, dispatch};
 
-/// Highest power of a coordinate of the board.
-const DEGREE: i32 = 2;
-/// Polynomials of that degree in two coordinates.
+/// Polynomials of the second degree in two coordinates of the board.
 const POLYNOMIALS: usize = 6;
 /// What is left of a column's square below this share is rounding.
 const INDEPENDENT: f64 = 1e-6;
@@ -28,32 +28,33 @@ pub struct SlowResiduals {
     pub freedom: usize,
 }
 
-/// Measures the slow part of the residuals of view `k` at the pose that fits it.
-pub(super) fn slow_residuals(
+/// What the pixels of view `k` say at a pose, at a noise of 1 px: the quadratic in the pose and the parameters, and the slow
+/// part of the residuals; of points that are not equally good each with its weight.
+///
+/// `None` where a point cannot be seen.
+pub(super) fn quadratic(
     problem: &Problem,
     k: usize,
     camera: &Camera,
     pose: &Se3,
     parameters: Option<&PixelParameters>,
     weights: Option<&[f64]>,
-) -> SlowResiduals {
+) -> Option<(ViewBlock, SlowResiduals)> {
     let samples = problem.samples(k);
     let free: &[usize] = parameters.map_or(&[], |p| &p.camera);
     let fitted = 6 + free.len();
+    // Behind pose, camera and polynomials the residual and what the scale of the board does, which the pose takes up.
     let columns = fitted + 2 * POLYNOMIALS;
-    if 2 * samples.len() < columns + FEWEST_LEFT {
-        return SlowResiduals::default();
-    }
+    let scale = columns + 1;
     let features = &problem.features()[samples.clone()];
     let (centre, half) = extent(&features.iter().map(|f| [f.position.x, f.position.y]));
-    let width = (columns + 1).next_multiple_of(MAX_LANES);
+    let width = (columns + 2).next_multiple_of(MAX_LANES);
     let mut rows = vec![0.0; 2 * samples.len() * width];
-    let points = features.iter().zip(&problem.pixels()[samples]);
+    let points = features.iter().zip(&problem.pixels()[samples.clone()]);
     for (n, ((feature, pixel), row)) in points.zip(rows.chunks_exact_mut(2 * width)).enumerate() {
-        let Some(seen) = camera.observe_with_derivatives(pose, feature) else {
-            return SlowResiduals::default();
-        };
+        let seen = camera.observe_with_derivatives(pose, feature)?;
         let (x, y) = ((feature.position.x - centre[0]) / half[0], (feature.position.y - centre[1]) / half[1]);
+        let turned = pose.rotation * feature.position;
         for (axis, row) in row.chunks_exact_mut(width).enumerate() {
             for (j, entry) in row[..6].iter_mut().enumerate() {
                 *entry = seen.d_twist[(axis, j)];
@@ -61,14 +62,11 @@ pub(super) fn slow_residuals(
             for (entry, j) in row[6..fitted].iter_mut().zip(free) {
                 *entry = seen.d_parameters[(axis, *j)];
             }
-            let mut at = fitted + axis * POLYNOMIALS;
-            for i in 0..=DEGREE {
-                for j in 0..=DEGREE - i {
-                    row[at] = x.powi(i) * y.powi(j);
-                    at += 1;
-                }
-            }
+            let at = fitted + axis * POLYNOMIALS;
+            row[at..at + POLYNOMIALS].copy_from_slice(&[1.0, y, y * y, x, x * y, x * x]);
             row[columns] = pixel[axis] - seen.pixel[axis];
+            // The first three columns of a twist are d pixel / d p, and d p / d scale = R P.
+            row[scale] = (0..3).map(|i| row[i] * turned[i]).sum();
             if let Some(weights) = weights {
                 let root = weights[n].sqrt();
                 for entry in row.iter_mut() {
@@ -77,10 +75,31 @@ pub(super) fn slow_residuals(
             }
         }
     }
-    let size = (columns + 1).next_multiple_of(TOGETHER);
+    let size = (columns + 2).next_multiple_of(TOGETHER);
     let mut gram = vec![0.0; size * width];
-    dispatch(VectorUnit::widest(), Accumulate::pairs(&rows, width, columns + 1, &mut gram));
-    eliminate(&mut gram, width, columns, fitted)
+    dispatch(VectorUnit::widest(), Accumulate::pairs(&rows, width, columns + 2, &mut gram));
+    let product = |i: usize, j: usize| gram[i.min(j) * width + i.max(j)];
+    let squared_px = product(columns, columns);
+    if !squared_px.is_finite() {
+        return None;
+    }
+    let own: Vec<usize> =
+        (6..fitted).chain(parameters.is_some_and(|p| p.board_scale).then_some(scale)).collect();
+    let block = ViewBlock {
+        m: Matrix6::from_fn(&product),
+        g: Vector6::from_fn(|i, _| -product(i, columns)),
+        columns: parameters.map(|_| PixelColumns {
+            mc: Matrix6xX::from_fn(own.len(), |i, j| product(i, own[j])),
+            cc: DMatrix::from_fn(own.len(), own.len(), |i, j| product(own[i], own[j])),
+            gc: DVector::from_fn(own.len(), |i, _| -product(own[i], columns)),
+        }),
+        squared_px,
+    };
+    if 2 * samples.len() < columns + FEWEST_LEFT {
+        return Some((block, SlowResiduals::default()));
+    }
+    let slow = eliminate(&mut gram, width, columns, fitted);
+    Some((block, slow))
 }
 
 /// Takes columns out of the residuals one by one; what those beyond the fitted ones take is slow.

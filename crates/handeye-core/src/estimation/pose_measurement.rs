@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
-use super::pixel_field::{SlowResiduals, slow_residuals};
+use super::pixel_field::{SlowResiduals, quadratic};
 use crate::camera::Camera;
 use crate::error::Error;
-use crate::least_squares::{PixelParameters, Problem, ViewBlock, view_block};
+use crate::least_squares::{PixelParameters, Problem, ViewBlock};
 use crate::se3::Se3;
 
 /// A view reduced to the pose that fits its image best.
@@ -73,7 +73,7 @@ pub fn compress(
     weights: Option<&[f64]>,
 ) -> Result<PoseMeasurement, Error> {
     let block_at = |pose: &Se3, parameters| {
-        view_block(problem, k, camera, pose, 1.0, parameters, weights).ok_or_else(|| {
+        quadratic(problem, k, camera, pose, parameters, weights).ok_or_else(|| {
             Error::numerical(format!("view {k}: a point is out of sight at the pose of its own image"))
         })
     };
@@ -86,10 +86,10 @@ pub fn compress(
     let mut pose = *pose;
     if weights.is_some() {
         // The pose fits points that weigh alike; from there one step of Newton's is within rounding of the other.
-        let block = block_at(&pose, None)?;
+        let (block, _) = block_at(&pose, None)?;
         pose = Se3::exp(&-(inverse(&block)? * block.g)) * pose;
     }
-    let block = block_at(&pose, parameters)?;
+    let (block, slow) = block_at(&pose, parameters)?;
     let covariance = inverse(&block)?;
     let (sensitivity, camera_information, camera_gradient) = match &block.columns {
         None => (Matrix6xX::zeros(0), DMatrix::zeros(0, 0), DVector::zeros(0)),
@@ -111,7 +111,7 @@ pub fn compress(
         camera_gradient,
         variance_px2: block.squared_px / degrees_of_freedom.max(1.0),
         degrees_of_freedom,
-        slow: slow_residuals(problem, k, camera, &pose, parameters, weights),
+        slow,
         is_foreign: false,
     })
 }

@@ -126,8 +126,7 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
     cell.check()?;
     let components = components::all(cell, &options.assumptions)?;
     let mut guess = Guess { x: start.0, y: start.1, away: vec![] };
-    let mut levels: Option<DVector<f64>> = None;
-    let (mut steps, mut rounds, mut converged) = (0, 0, false);
+    let (mut levels, mut steps, mut rounds) = (None, 0, 0);
     let at = |guess: &Guess| assemble(cell, guess, &components, &options.weak).reduced().ok_or_else(singular);
     let mut mixed = at(&guess)?;
     let away = if mixed.settled.rows > 0 { mixed.flange_twists(None) } else { vec![] };
@@ -148,21 +147,23 @@ pub fn estimate(cell: &Cell, start: (Vec<Se3>, Vec<Se3>), options: &Options) -> 
         let moved = largest_share(&answer, 6 * (cell.cameras.len() + cell.targets.len()));
         levels = Some(found.t.clone());
         if moved < AT_REST {
-            converged = true;
-            mode = Some(found);
+            mode = Some((found, answer));
             break;
         }
         guess = guess.moved(answer.theta.as_slice());
         guess.away = mixed.flange_twists(Some((&found.t, &answer.theta)));
         mixed = at(&guess)?;
     }
-    let found = match mode {
-        Some(found) => found,
-        None => find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()))?,
+    let converged = mode.is_some();
+    let (found, at_mode) = if let Some(mode) = mode {
+        mode
+    } else {
+        let found = find_mode(&mixed, levels.unwrap_or_else(|| mixed.start()))?;
+        let answer = answer_at(&mixed, &found.t)?;
+        (found, answer)
     };
-    let (nodes, at_mode) = average(&mixed, &found, options.pairs)?;
-    let come = (rounds, steps, converged && found.at_rest);
-    gather(cell, &guess, &mixed, (nodes, at_mode), &found, come)
+    let nodes = average(&mixed, &found, &at_mode, options.pairs);
+    gather(cell, &guess, &mixed, (nodes, &at_mode), &found, (rounds, steps, converged && found.at_rest))
 }
 
 pub(super) fn assemble(
@@ -302,52 +303,46 @@ fn damped_step(now: &Evaluation, damping: f64, held: &[usize]) -> DVector<f64> {
     step
 }
 
-/// The nodes with their shares, and the answer at the mode, the first of them.
-fn average(mixed: &Mixed, mode: &Mode, pairs: usize) -> Result<(Vec<Node>, Evaluation), Error> {
+/// The nodes with their shares, the mode first.
+fn average(mixed: &Mixed, mode: &Mode, at_mode: &Evaluation, pairs: usize) -> Vec<Node> {
     let points = nodes::around(&mode.t, &mode.curvature, pairs);
-    let mut answers: Vec<Option<Evaluation>> = points.iter().map(|_| None).collect();
+    // Levels at which the model is singular have no share.
+    let node = |t: &DVector<f64>, density: f64, answer: &Evaluation| Node {
+        weight: mode.value - answer.value - density,
+        levels: t.iter().map(|t| t.exp()).collect(),
+        theta: answer.theta.rows(0, mixed.told).into_owned(),
+        covariance: answer.covariance.view((0, 0), (mixed.told, mixed.told)).into_owned(),
+    };
+    let at = |points: &[(DVector<f64>, f64)]| -> Vec<Node> {
+        let found =
+            |(t, density): &(DVector<f64>, f64)| Some(node(t, *density, &mixed.evaluate(t, Wanted::Answer)?));
+        points.iter().filter_map(found).collect()
+    };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let share = points.len().div_ceil(threads);
+    let around = &points[1..];
+    let (own, others) = around.split_at(around.len().div_ceil(threads));
+    let mut nodes = vec![node(&mode.t, 0.0, at_mode)];
     std::thread::scope(|scope| {
-        for (points, answers) in points.chunks(share).zip(answers.chunks_mut(share)) {
-            scope.spawn(move || {
-                for ((t, _), answer) in points.iter().zip(answers) {
-                    *answer = mixed.evaluate(t, Wanted::Answer);
-                }
-            });
+        let others: Vec<_> =
+            others.chunks(own.len().max(1)).map(|points| scope.spawn(|| at(points))).collect();
+        nodes.extend(at(own));
+        for thread in others {
+            nodes.extend(thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         }
     });
-    let mut nodes = Vec::new();
-    let mut logs = Vec::new();
-    let mut at_mode = None;
-    for ((t, density), answer) in points.into_iter().zip(answers) {
-        // Levels at which the model is singular have no share.
-        let Some(answer) = answer else { continue };
-        logs.push(mode.value - answer.value - density);
-        nodes.push(Node {
-            weight: 0.0,
-            levels: t.iter().map(|t| t.exp()).collect(),
-            theta: answer.theta.rows(0, mixed.told).into_owned(),
-            covariance: answer.covariance.view((0, 0), (mixed.told, mixed.told)).into_owned(),
-        });
-        at_mode.get_or_insert(answer);
+    let most = nodes.iter().map(|node| node.weight).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = nodes.iter().map(|node| (node.weight - most).exp()).sum();
+    for node in &mut nodes {
+        node.weight = (node.weight - most).exp() / total;
     }
-    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if !most.is_finite() {
-        return Err(singular());
-    }
-    let total: f64 = logs.iter().map(|l| (l - most).exp()).sum();
-    for (node, log) in nodes.iter_mut().zip(&logs) {
-        node.weight = (log - most).exp() / total;
-    }
-    Ok((nodes, at_mode.ok_or_else(singular)?))
+    nodes
 }
 
 fn gather(
     cell: &Cell,
     guess: &Guess,
     mixed: &Mixed,
-    (nodes, at_mode): (Vec<Node>, Evaluation),
+    (nodes, at_mode): (Vec<Node>, &Evaluation),
     mode: &Mode,
     (rounds, steps, converged): (usize, usize, bool),
 ) -> Result<Posterior, Error> {
@@ -385,7 +380,7 @@ fn gather(
         value: mode.value,
         attribution,
         robot_loss: without - mode.value,
-        information: at_mode.information,
+        information: at_mode.information.clone(),
         rounds,
         steps,
         converged,

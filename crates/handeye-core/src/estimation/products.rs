@@ -2,38 +2,7 @@
 
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 
-use nalgebra::DMatrix;
-
 use crate::simd::{Kernel, Simd, Vector};
-
-/// `L^-1` times rows, in place.
-pub(super) struct Whiten<'a> {
-    pub factor: &'a DMatrix<f64>,
-    pub rows: &'a mut [f64],
-    pub width: usize,
-}
-
-impl Kernel for Whiten<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        let size = self.factor.nrows();
-        for i in 0..size {
-            let (done, rest) = self.rows.split_at_mut(i * self.width);
-            let row = &mut rest[..self.width];
-            let inverse = simd.splat(1.0 / self.factor[(i, i)]);
-            for at in (0..self.width).step_by(S::LANES) {
-                let mut value = simd.load(&row[at..]);
-                for j in 0..i {
-                    let factor = simd.splat(self.factor[(i, j)]);
-                    value = factor.neg_mul_add(simd.load(&done[j * self.width + at..]), value);
-                }
-                (value * inverse).store(&mut row[at..]);
-            }
-        }
-    }
-}
 
 /// Columns whose products are summed together.
 pub(super) const TOGETHER: usize = 4;
@@ -122,6 +91,8 @@ pub(super) struct Product<'a> {
     /// Row by row, `across` apart; as many rows as columns of the rows take part.
     pub matrix: &'a [f64],
     pub across: usize,
+    /// First columns of the matrix that are zero below the diagonal.
+    pub triangular: usize,
     pub out: &'a mut [f64],
 }
 
@@ -137,7 +108,9 @@ impl Kernel for Product<'_> {
         for first in (0..count).step_by(ROWS) {
             for at in (0..self.across).step_by(S::LANES) {
                 let mut totals = [simd.splat(0.0); ROWS];
-                for (i, line) in self.matrix.chunks_exact(self.across).enumerate() {
+                let end = at + S::LANES;
+                let rows = if end <= self.triangular { end } else { usize::MAX };
+                for (i, line) in self.matrix.chunks_exact(self.across).enumerate().take(rows) {
                     let values = simd.load(&line[at..]);
                     for (k, total) in totals.iter_mut().enumerate() {
                         // Where rows run out, the last of them again.

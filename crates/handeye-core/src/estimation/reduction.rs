@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector, Vector6};
 
 use super::assembly::{in_one, square};
-use super::mixed::{Mixed, Station, add};
+use super::mixed::{Mixed, Station, add, covariances};
 use super::products::{Accumulate, Product, TOGETHER};
 use crate::simd::dispatch;
 
@@ -39,6 +39,7 @@ impl Mixed {
                 width: station.size,
                 matrix: &station.rows,
                 across: self.width,
+                triangular: 0,
                 out: &mut rows,
             };
             dispatch(self.unit, product);
@@ -60,6 +61,9 @@ impl Mixed {
                 prior.squares[k] = square(&station.columns(prior, self.width));
             }
             self.stations[k] = station;
+        }
+        if !free.is_empty() {
+            self.covariances = covariances(&self.stations, &self.noises, &self.priors);
         }
         let mut sum = vec![0.0; (n + 1).next_multiple_of(TOGETHER) * self.width];
         dispatch(self.unit, Accumulate::pairs(&free, self.width, n + 1, &mut sum));

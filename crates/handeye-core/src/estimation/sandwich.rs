@@ -2,16 +2,19 @@
 
 use nalgebra::DMatrix;
 
-use super::mixed::{Evaluation, Mixed, add};
-use super::products::{Accumulate, Product, TOGETHER};
+use super::mixed::{Evaluation, Mixed};
+use super::products::{Accumulate, TOGETHER};
+use super::station_covariances::{Between, StationFactors};
 use crate::positive::Factor;
 use crate::simd::{MAX_LANES, dispatch};
 
 impl Mixed {
     /// The answer as if recurring errors were new at every station, with its covariance under the model as it is: the
-    /// sandwich of a working model (Huber 1967, White 1980).
+    /// sandwich of a working model (Huber 1967, White 1980). Given are the factors of the stations' covariances without
+    /// what recurs.
     pub(super) fn answer_apart(
         &self,
+        alone: &StationFactors,
         noise: &[f64],
         prior: &[f64],
         evaluation: &mut Evaluation,
@@ -33,40 +36,21 @@ impl Mixed {
         let mut sum = vec![0.0; p.next_multiple_of(TOGETHER) * self.width];
         dispatch(self.unit, Accumulate::pairs(rows, self.width, p, &mut sum));
         let shared = DMatrix::from_fn(p, recurring, |i, j| sum[i * self.width + p + j] * scales[j]);
-        // What the recurring errors of each station do to the answer, of their covariance there.
+        // Without what recurs the rows are less than of unit noise: what is between them then.
         let narrow = p.next_multiple_of(MAX_LANES);
-        let mut told = vec![0.0; rows.len() / self.width * narrow];
-        for (to, row) in told.chunks_exact_mut(narrow).zip(rows.chunks_exact(self.width)) {
-            to.copy_from_slice(&row[..narrow]);
-        }
-        let mut moved = vec![0.0; told.len()];
-        let mut first = 0;
-        for (k, (station, factor)) in self.stations.iter().zip(&whitened.factors).enumerate() {
-            let end = first + station.size * narrow;
-            let covariance = self.recurring_at(k, prior, factor);
-            let product = Product {
-                rows: covariance.as_slice(),
-                width: station.size,
-                matrix: &told[first..end],
-                across: narrow,
-                out: &mut moved[first..end],
-            };
-            if station.size > 0 {
-                dispatch(self.unit, product);
-            }
-            first = end;
-        }
-        let mut own = vec![0.0; p.next_multiple_of(TOGETHER) * narrow];
-        let both = Accumulate {
-            left: &told,
-            width: narrow,
-            size: p,
-            right: &moved,
-            across: narrow,
-            upper: true,
-            sum: &mut own,
+        let mut left = vec![0.0; self.rows() * narrow];
+        let between = Between {
+            factors: &whitened.factors,
+            others: alone,
+            sizes: &self.covariances.sizes,
+            rows,
+            width: self.width,
+            narrow,
+            out: &mut left,
         };
-        dispatch(self.unit, both);
+        dispatch(self.unit, between);
+        let mut own = vec![0.0; p.next_multiple_of(TOGETHER) * narrow];
+        dispatch(self.unit, Accumulate::pairs(&left, narrow, p, &mut own));
         for i in 0..p {
             right[i] -= sum[i * self.width + n];
             for j in i..p {
@@ -79,23 +63,11 @@ impl Mixed {
         }
         let bread = Factor::new(&information)?.inverse();
         let theta = &bread * right;
-        let own = DMatrix::from_fn(p, p, |i, j| own[i.min(j) * narrow + i.max(j)]);
-        let meat = &shared * shared.transpose() - own;
+        let recurs = |i: usize, j: usize| own[i * narrow + j] - sum[i * self.width + j];
+        let meat = &shared * shared.transpose() + DMatrix::from_fn(p, p, |i, j| recurs(i.min(j), i.max(j)));
         evaluation.covariance = &bread + &bread * meat * &bread;
         evaluation.theta = theta;
         evaluation.information = information;
         Some(())
-    }
-
-    /// Covariance of the recurring errors of a station in units of its noise, whose Cholesky factor is given.
-    fn recurring_at(&self, k: usize, prior: &[f64], factor: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut covariance = DMatrix::zeros(factor.nrows(), factor.nrows());
-        for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| q.recurring) {
-            add(&mut covariance, s * s, &q.squares[k]);
-        }
-        factor.solve_lower_triangular_unchecked_mut(&mut covariance);
-        covariance.transpose_mut();
-        factor.solve_lower_triangular_unchecked_mut(&mut covariance);
-        covariance
     }
 }

@@ -6,7 +6,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::mixed::{Evaluation, Mixed, Whitened};
-use super::products::{Accumulate, Product, RowProducts, TOGETHER, Whiten};
+use super::products::{Accumulate, Product, RowProducts, TOGETHER};
+use crate::positive::Factor;
 use crate::simd::{MAX_LANES, dispatch};
 
 impl Mixed {
@@ -14,12 +15,12 @@ impl Mixed {
     pub(super) fn differentiate(
         &self,
         whitened: &Whitened,
-        noise: &[f64],
-        prior: &[f64],
+        factor: &Factor,
+        (noise, prior): (&[f64], &[f64]),
         evaluation: &mut Evaluation,
     ) {
         let n = self.size;
-        let Evaluation { slope, curvature, theta, covariance, .. } = evaluation;
+        let Evaluation { slope, curvature, theta, .. } = evaluation;
         let terms = self.noises.len() + self.priors.len();
         // Deviations of the parameters from their priors.
         let deviations: Vec<Vec<f64>> = self
@@ -33,26 +34,38 @@ impl Mixed {
                 u
             })
             .collect();
-        let (acts, mut slopes) = self.acts(whitened, noise, theta, covariance, &deviations);
+        // A root of the covariance, theta and the deviations side by side: rows times them give what is needed of the
+        // rows.
+        let wide = (n + 1 + self.priors.len()).next_multiple_of(MAX_LANES);
+        let mut matrix = factor.inverse_root(wide);
+        for (line, theta) in matrix.chunks_exact_mut(wide).zip(theta.iter()) {
+            line[n] = *theta;
+        }
+        for (j, (p, u)) in self.priors.iter().zip(&deviations).enumerate() {
+            for (i, value) in p.range().zip(u) {
+                matrix[i * wide + n + 1 + j] = *value;
+            }
+        }
+        let (acts, mut slopes) = self.acts(whitened, noise, &matrix, wide);
         // B' V^-1 dV P y of each term, and the products of what they do.
         let across = terms.next_multiple_of(MAX_LANES);
-        let mut sum = vec![0.0; n.next_multiple_of(TOGETHER) * across];
+        let mut pulled = vec![0.0; n.next_multiple_of(TOGETHER) * across];
         let (left, width) = (&whitened.rows[..], self.width);
-        let onto = Accumulate { left, width, size: n, right: &acts, across, upper: false, sum: &mut sum };
+        let onto = Accumulate { left, width, size: n, right: &acts, across, upper: false, sum: &mut pulled };
         dispatch(self.unit, onto);
-        let mut pulled: Vec<DVector<f64>> =
-            (0..terms).map(|j| DVector::from_fn(n, |i, _| sum[i * across + j])).collect();
-        let mut sum = vec![0.0; terms.next_multiple_of(TOGETHER) * across];
-        dispatch(self.unit, Accumulate::pairs(&acts, across, terms, &mut sum));
-        let mut products = DMatrix::from_fn(terms, terms, |i, j| sum[i.min(j) * across + i.max(j)]);
+        let mut products = vec![0.0; terms.next_multiple_of(TOGETHER) * across];
+        dispatch(self.unit, Accumulate::pairs(&acts, across, terms, &mut products));
         for (i, (p, s)) in self.priors.iter().zip(prior).enumerate() {
             let weight = s.powi(-2);
-            let u = &deviations[i];
-            let mu = p.times(u);
-            let block = covariance.view((p.first, p.first), (p.count, p.count));
-            let trace = match &p.information {
-                None => block.trace(),
-                Some(m) => m.dot(&block),
+            let u = DVector::from_column_slice(&deviations[i]);
+            let mu = p.times(u.as_slice());
+            let root = |i: usize| &matrix[i * wide + i..i * wide + n];
+            let trace: f64 = match &p.information {
+                None => p.range().map(|i| root(i).iter().map(|x| x * x).sum::<f64>()).sum(),
+                Some(m) => {
+                    let of = DMatrix::from_fn(p.count, n, |i, j| matrix[(p.first + i) * wide + j]);
+                    m.dot(&(&of * of.transpose()))
+                }
             };
             let squared: f64 = u.iter().zip(&mu).map(|(a, b)| a * b).sum();
             let at = self.noises.len() + i;
@@ -61,12 +74,27 @@ impl Mixed {
             for (j, other) in self.priors.iter().enumerate().take(i + 1) {
                 let between = self.given.view((p.first, other.first), (p.count, other.count));
                 let v = DVector::from_column_slice(&deviations[j]);
-                let product = 4.0 * DVector::from_column_slice(u).dot(&(between * v));
-                products[(at, self.noises.len() + j)] += product;
+                products[(self.noises.len() + j) * across + at] += 4.0 * u.dot(&(between * v));
             }
-            pulled[at] += self.given.columns(p.first, p.count) * DVector::from_column_slice(u) * -2.0;
+            let given = self.given.columns(p.first, p.count) * u;
+            for (line, given) in pulled.chunks_exact_mut(across).zip(given.iter()) {
+                line[at] -= 2.0 * given;
+            }
         }
-        let solved: Vec<DVector<f64>> = pulled.iter().map(|v| &*covariance * v).collect();
+        let mut solved = vec![0.0; n.next_multiple_of(TOGETHER) * across];
+        let rows = &pulled[..n * across];
+        let by_root = Accumulate {
+            left: &matrix,
+            width: wide,
+            size: n,
+            right: rows,
+            across,
+            upper: false,
+            sum: &mut solved,
+        };
+        dispatch(self.unit, by_root);
+        let mut absorbed = vec![0.0; products.len()];
+        dispatch(self.unit, Accumulate::pairs(&solved[..n * across], across, terms, &mut absorbed));
         let of = |i: usize| -> &[usize] {
             if i < self.noises.len() {
                 &self.noises[i].levels
@@ -83,7 +111,7 @@ impl Mixed {
                 }
             }
             for j in 0..=i {
-                let entry = 0.5 * (products[(i, j)] - pulled[i].dot(&solved[j]));
+                let entry = 0.5 * (products[j * across + i] - absorbed[j * across + i]);
                 for l in of(i) {
                     for m in of(j) {
                         curvature[(*l, *m)] += entry;
@@ -96,48 +124,34 @@ impl Mixed {
         }
     }
 
-    /// `dV P y` of each term, whitened, in the rows of the stations; of each noise, twice its slope.
-    fn acts(
-        &self,
-        whitened: &Whitened,
-        noise: &[f64],
-        theta: &DVector<f64>,
-        covariance: &DMatrix<f64>,
-        deviations: &[Vec<f64>],
-    ) -> (Vec<f64>, Vec<f64>) {
+    /// `dV P y` of each term, whitened, in the rows of the stations; of each noise, twice its slope. Side by side in the
+    /// matrix, `wide` across: a root of the covariance of the parameters, theta, and deviations from each prior.
+    fn acts(&self, whitened: &Whitened, noise: &[f64], matrix: &[f64], wide: usize) -> (Vec<f64>, Vec<f64>) {
         let n = self.size;
         let terms = self.noises.len() + self.priors.len();
         let across = terms.next_multiple_of(MAX_LANES);
-        // The covariance, theta and the deviations side by side: rows times them give what is needed of the rows.
-        let wide = (n + 1 + self.priors.len()).next_multiple_of(MAX_LANES);
-        let mut matrix = vec![0.0; n * wide];
-        for (i, line) in matrix.chunks_exact_mut(wide).enumerate() {
-            line[..n].copy_from_slice(&covariance.as_slice()[i * n..(i + 1) * n]);
-            line[n] = theta[i];
-        }
-        for (j, (p, u)) in self.priors.iter().zip(deviations).enumerate() {
-            for (i, value) in p.range().zip(u) {
-                matrix[i * wide + n + 1 + j] = *value;
-            }
-        }
         let mut slopes = vec![0.0; terms];
         let mut all = vec![0.0; whitened.rows.len() / self.width * across];
         let (mut rest, mut rest_acts) = (&whitened.rows[..], &mut all[..]);
-        let (mut through, mut spread, mut roots, mut turned) = (vec![], vec![], vec![], vec![]);
-        for (station, factor) in self.stations.iter().zip(&whitened.factors) {
+        let columns = self.roots_across();
+        let all_roots = self.whiten(&whitened.factors, |station| &station.roots, columns);
+        let mut rest_roots = &all_roots[..];
+        let (mut through, mut spread, mut turned) = (vec![], vec![], vec![]);
+        for station in &self.stations {
             let size = station.size;
             if size == 0 {
                 continue;
             }
             let (rows, after) = rest.split_at(size * self.width);
             let (acts, acts_after) = rest_acts.split_at_mut(size * across);
-            (rest, rest_acts) = (after, acts_after);
+            let (roots, roots_after) = rest_roots.split_at(size * columns);
+            (rest, rest_acts, rest_roots) = (after, acts_after, roots_after);
             through.clear();
             through.resize(size * wide, 0.0);
             spread.clear();
             spread.resize(size * size, 0.0);
             let product =
-                Product { rows, width: self.width, matrix: &matrix, across: wide, out: &mut through };
+                Product { rows, width: self.width, matrix, across: wide, triangular: n, out: &mut through };
             dispatch(self.unit, product);
             // Whitened P y.
             let mut q = Vec::with_capacity(size);
@@ -150,28 +164,25 @@ impl Mixed {
                 for (act, moved) in acts[self.noises.len()..terms].iter_mut().zip(&through[n + 1..]) {
                     *act = -2.0 * moved;
                 }
-                // Beside it stand the measurements in the rows.
-                through[n] = 0.0;
+                // Of the root alone the products are wanted.
+                through[n..].fill(0.0);
             }
-            let products = RowProducts {
-                left: &through,
-                across: wide,
-                right: rows,
-                width: self.width,
-                out: &mut spread,
-            };
+            let products =
+                RowProducts { left: &through, across: wide, right: &through, width: wide, out: &mut spread };
             dispatch(self.unit, products);
-            if station.roots.is_empty() {
+            if columns == 0 {
                 continue;
             }
-            roots.clear();
-            roots.extend_from_slice(&station.roots);
-            let columns = roots.len() / size;
-            dispatch(self.unit, Whiten { factor, rows: &mut roots, width: columns });
             turned.clear();
             turned.resize(roots.len(), 0.0);
-            let product =
-                Product { rows: &spread, width: size, matrix: &roots, across: columns, out: &mut turned };
+            let product = Product {
+                rows: &spread,
+                width: size,
+                matrix: roots,
+                across: columns,
+                triangular: 0,
+                out: &mut turned,
+            };
             dispatch(self.unit, product);
             let mut along = vec![0.0; columns];
             let mut traces = vec![0.0; columns];

@@ -90,46 +90,25 @@ impl Moments {
     }
 }
 
-/// The quadratic of view `k` of `problem` at `pose = T_camera_target`, noise `sigma` px; of points that are not equally
-/// good each with its weight beside.
+/// The quadratic of view `k` of `problem` in its pose, at `pose = T_camera_target`, noise `sigma` px.
 ///
 /// `None` where a point cannot be seen (behind the camera, outside the lens' valid region).
-pub fn view_block(
-    problem: &Problem,
-    k: usize,
-    camera: &Camera,
-    pose: &Se3,
-    sigma: f64,
-    pixel_parameters: Option<&PixelParameters>,
-    weights: Option<&[f64]>,
-) -> Option<ViewBlock> {
+pub fn view_block(problem: &Problem, k: usize, camera: &Camera, pose: &Se3, sigma: f64) -> Option<ViewBlock> {
     let range = problem.samples(k);
-    let of_view = 1.0 / (sigma * sigma);
+    let weight = 1.0 / (sigma * sigma);
     let mut moments = Moments::new();
-    let mut columns = pixel_parameters.map(|p| (p, PixelColumns::zeros(p.count())));
     let mut squared_px = 0.0;
-    let points = problem.features()[range.clone()].iter().zip(&problem.pixels()[range]);
-    for (i, (feature, pixel)) in points.enumerate() {
-        let relative = weights.map_or(1.0, |weights| weights[i]);
-        let weight = of_view * relative;
-        let residual;
-        if let Some((parameters, columns)) = &mut columns {
-            let seen = camera.observe_with_derivatives(pose, feature)?;
-            residual = seen.pixel - pixel;
-            moments.add(&seen.d_twist, &residual, weight);
-            columns.add(parameters, &seen, &(pose.rotation * feature.position), &residual, weight);
-        } else {
-            let (predicted, d_twist) = camera.observe_with_twist_derivative(pose, feature)?;
-            residual = predicted - pixel;
-            moments.add(&d_twist, &residual, weight);
-        }
-        squared_px += relative * residual.norm_squared();
+    for (feature, pixel) in problem.features()[range.clone()].iter().zip(&problem.pixels()[range]) {
+        let (predicted, d_twist) = camera.observe_with_twist_derivative(pose, feature)?;
+        let residual = predicted - pixel;
+        moments.add(&d_twist, &residual, weight);
+        squared_px += residual.norm_squared();
     }
     if !squared_px.is_finite() {
         return None;
     }
     let (m, g) = moments.finish();
-    Some(ViewBlock { m, g, columns: columns.map(|c| c.1), squared_px })
+    Some(ViewBlock { m, g, columns: None, squared_px })
 }
 
 /// Widest set of pixel parameters: all of a lens' and the board scale.

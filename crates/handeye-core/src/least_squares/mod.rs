@@ -1,8 +1,7 @@
 //! Maximum likelihood on reprojection error over the chain `X A_k Y`, robot and camera taken as exact.
 //!
 //! Unknowns are `X` and `Y`, twelve parameters; a prior may say where they are. Twists perturb on the left:
-//! `X <- exp(xi_x) X`. For models that free the camera, [`view_block`] gives the quadratic of a view in its pose and in
-//! the parameters of camera and board.
+//! `X <- exp(xi_x) X`. [`view_block`] gives the quadratic of a view in its pose.
 
 mod accumulate;
 mod batched;

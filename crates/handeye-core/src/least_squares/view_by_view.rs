@@ -72,7 +72,7 @@ fn linearise(problem: &Problem, model: &Model, x: Se3, y: Se3) -> Result<State, 
     let mut views = Vec::with_capacity(problem.view_count());
     for (k, sigma) in model.pixel_sigma.iter().enumerate() {
         let before_y = x * *problem.motion(k);
-        let block = view_block(problem, k, problem.camera(), &(before_y * y), *sigma, None, None).ok_or(k)?;
+        let block = view_block(problem, k, problem.camera(), &(before_y * y), *sigma).ok_or(k)?;
         cost += block.squared_px / (sigma * sigma);
         views.push((block, before_y.adjoint()));
     }
