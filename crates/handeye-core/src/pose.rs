@@ -15,6 +15,9 @@ pub const MIN_FEATURES: usize = 3;
 /// Steps tried before giving up; from a closed-form start it takes three to six.
 const MAX_STEPS: usize = 100;
 
+/// Damping to begin with, a share of the diagonal: little, as turns and shifts across go together almost entirely.
+const FIRST_DAMPING: f64 = 1e-6;
+
 /// Ends when a step is predicted to lower the cost by no more than this part of it.
 const COST_TOLERANCE: f64 = 1e-14;
 
@@ -43,15 +46,6 @@ struct Normal {
     information: Matrix6<f64>,
     gradient: Vector6<f64>,
     cost: f64,
-}
-
-/// Half the sum of squared residuals; None where a feature is not seen.
-fn cost(camera: &Camera, features: &[Feature], pixels: &[Vector2<f64>], t: &Se3) -> Option<f64> {
-    let mut sum = 0.0;
-    for (feature, pixel) in features.iter().zip(pixels) {
-        sum += (pixel - camera.observe(t, feature)?).norm_squared();
-    }
-    Some(0.5 * sum)
 }
 
 /// The normal equations; the index of a feature that is not seen otherwise.
@@ -87,7 +81,7 @@ pub fn refine_pose(
             "feature {i} is not in view of the camera at the starting pose of the target"
         ))
     })?;
-    let mut damping = 1e-4;
+    let mut damping = FIRST_DAMPING;
     for steps in 0..MAX_STEPS {
         let mut damped = sums.information;
         for i in 0..6 {
@@ -104,11 +98,9 @@ pub fn refine_pose(
             return Ok(PoseFit { t_camera_target: t, rmse_px, information: sums.information, steps });
         }
         let trial = Se3::exp(&step) * t;
-        match cost(camera, features, pixels, &trial) {
-            Some(lower) if lower < sums.cost => {
-                t = trial;
-                sums = normal(camera, features, pixels, &t)
-                    .map_err(|_| diverged(steps, sums.cost, features.len()))?;
+        match normal(camera, features, pixels, &trial) {
+            Ok(lower) if lower.cost < sums.cost => {
+                (t, sums) = (trial, lower);
                 damping = (damping * 0.1).max(1e-12);
             }
             _ => damping = (damping * 10.0).max(1e-8),

@@ -41,7 +41,7 @@ def chain_information(measurements: Measurements, X: Pose, noise: Noise, forward
         root = before @ isotropic_root(noise.robot_translation_m, noise.robot_rotation_rad)
         covariance = covariance + root @ root.transpose(0, 2, 1)
     rows = np.concatenate([np.broadcast_to(np.eye(6), to_y.shape), to_y], axis=2)
-    return np.einsum("kij,kil->jl", rows, np.linalg.solve(covariance, rows))
+    return rows.reshape(-1, 12).T @ np.linalg.solve(covariance, rows).reshape(-1, 12)
 
 
 def null_directions(measurements: Measurements, X: Pose, Y: Pose, noise: Noise) -> FloatArray:
