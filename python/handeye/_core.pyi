@@ -163,12 +163,14 @@ def fit_corners(
     turns: ArrayLike,
     is_crossing: bool,
     rough: bool,
-) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64]]:
+) -> tuple[
+    NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64], NDArray[float64]
+]:
     """Corners (N, 2) fitted to grey values; NaN where there is none near the guess.
 
     Also the covariances (N, 2, 2) of the places for residuals of one grey value, the root mean squares (N,)
-    of the residuals in the smoothed picture, the contrasts (N,), and the deviations (N,) of the Gaussian that
-    blurs the edges of the smoothed picture, in pixels.
+    of the residuals in the smoothed picture and of those that may move the place, the contrasts (N,), and the
+    deviations (N,) of the Gaussian that blurs the edges of the smoothed picture, in pixels.
 
     `image` (H, W) is contiguous. `places` (N, 2) are guesses, `directions` (N, 2, 2) those of the two edges,
     `curvatures` (N, 2) theirs in 1 / px towards the normals (-sin, cos). `radii` (N,) are free of other

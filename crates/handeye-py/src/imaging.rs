@@ -42,8 +42,9 @@ pub fn picture<'a, T: numpy::Element + Copy + Into<f32>>(
     Picture::new(grey, width, height).map_err(|e| to_python(py, e))
 }
 
-/// Places, covariances of them for residuals of one grey value, misfits, contrasts and blurs.
+/// Places, covariances of them for residuals of one grey value, misfits, those that may move them, contrasts and blurs.
 type Fits<'py> = (
+    Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyArrayDyn<f64>>,
@@ -99,6 +100,7 @@ fn fit_corners<'py>(
         convert::array(py, &[n, 2], found.iter().flat_map(place).collect()),
         convert::array(py, &[n, 2, 2], found.iter().flat_map(spread).collect()),
         convert::array(py, &[n], found.iter().map(|c| c.map_or(f64::NAN, |c| c.misfit)).collect()),
+        convert::array(py, &[n], found.iter().map(|c| c.map_or(f64::NAN, |c| c.noise)).collect()),
         convert::array(py, &[n], found.iter().map(|c| c.map_or(f64::NAN, |c| c.contrast)).collect()),
         convert::array(py, &[n], found.iter().map(|c| c.map_or(f64::NAN, |c| c.blur)).collect()),
     ))

@@ -48,6 +48,12 @@ class CornerKind(Enum):
     """Four parts of any grey: the corner of a tag, with or without a square that touches it."""
 
 
+# Noise that was smoothed is alike from pixel to pixel, which is not the same for all that is fitted: of the
+# variance that an even share of it would make, so much there is. At a crossing light that changes across the
+# window has more than its share. For windows of 8 to 24 px.
+ALIKE = {CornerKind.CROSSING: 0.77, CornerKind.QUADRANTS: 0.95}
+
+
 def astray(found: FloatArray, expected: FloatArray, pitches_px: FloatArray) -> NDArray[np.bool_]:
     """Tell which corners (N, 2) are not there or too far from where they are expected; pitches are (N,)."""
     away = np.linalg.norm(found - expected, axis=1)
@@ -123,6 +129,9 @@ class CornerFits:
         (N, 2, 2) covariances of the places in px^2, for independent residuals of one grey value.
     misfits
         (N,) root mean squares of the residuals, in grey values of the smoothed picture.
+    noises
+        (N,) the same of those alone that may move a place: of crossings, not those that look the same after
+        half a turn, as a camera's gamma makes them.
     contrasts
         (N,) grey steps across the edges.
     blurs
@@ -132,6 +141,7 @@ class CornerFits:
     places: FloatArray
     spreads: FloatArray
     misfits: FloatArray
+    noises: FloatArray
     contrasts: FloatArray
     blurs: FloatArray
 
@@ -144,10 +154,10 @@ class CornerFits:
     @property
     def sigmas_px(self) -> FloatArray:
         """(N,) standard deviations of the places, of one coordinate."""
-        there = np.isfinite(self.misfits)
-        usual = float(np.median(self.misfits[there])) if there.any() else np.nan
-        # A smaller misfit than is usual in the picture comes of a window of few pixels, not of less noise.
-        noise = 2 * np.sqrt(np.pi) * SMOOTHING_PX * np.maximum(self.misfits, usual)
+        there = np.isfinite(self.noises)
+        usual = float(np.median(self.noises[there])) if there.any() else np.nan
+        # Less than is usual in the picture comes of a window of few pixels, not of less noise.
+        noise = 2 * np.sqrt(np.pi) * SMOOTHING_PX * np.maximum(self.noises, usual)
         # What moves a place is a bell across the edges, which smoothing makes lower and wider.
         smoothed = self.blurs / np.hypot(self.blurs, SMOOTHING_PX)
         return noise * np.sqrt(smoothed * np.trace(self.spreads, axis1=1, axis2=2) / 2)
@@ -205,7 +215,7 @@ def corner_fits(
     rough
         Whether to end near the places, as is enough to begin once more from there.
     """
-    found = _core.fit_corners(
+    places, spreads, *others = _core.fit_corners(
         image,
         corners,
         directions,
@@ -217,7 +227,7 @@ def corner_fits(
         kind is CornerKind.CROSSING,
         rough,
     )
-    return CornerFits(*found)
+    return CornerFits(places, ALIKE[kind] * spreads, *others)
 
 
 def fit_corners(

@@ -8,6 +8,7 @@ use nalgebra::{SMatrix, SVector};
 use super::Picture;
 use super::corner_equations::{Equations, FIRST, Greys, LOG_BLUR, MEAN, N, PRODUCT, SECOND, Sum, X, Y};
 pub use super::corner_guess::CornerGuess;
+use super::corner_symmetry::Asymmetry;
 use super::corner_window::{SMOOTHING_PX, Window};
 use crate::simd::{VectorUnit, dispatch};
 
@@ -51,6 +52,9 @@ pub struct Corner {
     pub spread: [[f64; 2]; 2],
     /// Root mean square of the residuals, in grey values of the smoothed picture.
     pub misfit: f64,
+    /// The same of those residuals alone that may move the place: of a crossing, not those that look the same after
+    /// half a turn.
+    pub noise: f64,
     /// Standard deviation of the Gaussian that blurs the edges of the smoothed picture, in pixels.
     pub blur: f64,
     /// Grey step across the edges.
@@ -146,12 +150,20 @@ impl<'a, T: Copy + Into<f32>> CornerFitter<'a, T> {
         let ridge =
             SMatrix::<f64, N, N>::from_diagonal(&equations.normal.diagonal().map(|d| 1e-9 * d + 1e-12));
         let cost = equations.cost;
+        let moving = if self.kind == CornerKind::Crossing && !rough {
+            let p = fit.as_slice().try_into().unwrap_or([0.0; N]);
+            let samples = &self.window.samples;
+            dispatch(self.unit, Asymmetry { samples, p, bends: guess.curvatures }).min(cost)
+        } else {
+            cost
+        };
         told.join(&mut equations, &fit);
         let covariance = (equations.normal + ridge).cholesky()?.inverse();
         Some(Corner {
             place: [origin[0] + fit[X], origin[1] + fit[Y]],
             spread: [X, Y].map(|i| [X, Y].map(|k| covariance[(i, k)])),
             misfit: (cost.max(0.0) / weight).sqrt(),
+            noise: (moving.max(0.0) / weight).sqrt(),
             blur: fit[LOG_BLUR].exp(),
             contrast: 2.0 * fit[PRODUCT].abs(),
         })

@@ -76,11 +76,11 @@ pub(super) struct Sum<'a, const IS_CROSSING: bool> {
 }
 
 /// A blurred edge at pixels: side runs from -1 to 1, slope is its derivative in the distance.
-struct Edge<V> {
+pub(super) struct Edge<V> {
     distance: V,
-    along: V,
-    side: V,
-    slope: V,
+    pub along: V,
+    pub side: V,
+    pub slope: V,
 }
 
 impl<const IS_CROSSING: bool> Kernel for Sum<'_, IS_CROSSING> {
@@ -235,7 +235,7 @@ impl<const IS_CROSSING: bool> Kernel for Greys<'_, IS_CROSSING> {
 
 /// A parabola stands for the arc of a bent edge; its derivatives, which matter little to a step, are left out.
 #[inline(always)]
-fn edge<S: Simd>(
+pub(super) fn edge<S: Simd>(
     simd: S,
     x: S::Vector,
     y: S::Vector,

@@ -4,6 +4,7 @@ pub mod alignment;
 pub mod corner;
 mod corner_equations;
 mod corner_guess;
+mod corner_symmetry;
 mod corner_window;
 mod correlation;
 pub mod neighbours;
