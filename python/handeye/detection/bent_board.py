@@ -12,6 +12,8 @@ from handeye.types.arrays import FloatArray
 # what ordinary lenses do about the image's centre, one term more for each point above four.
 POINTS_OF_POLYNOMIALS, DEGREE = 36, 5
 OF_HOMOGRAPHY = 8
+# Places of an outline by which a term's mean over it is told, exactly: a term is of the fifth degree at most.
+AROUND = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,18 +39,18 @@ class BentBoard:
 
         Circles have radii (N,), other points none; places (N, 2) and radii are in metres.
         """
-        lens, flat, columns = np.zeros(pixels.shape), pixels, np.zeros((0, 0))
+        lens, columns = np.zeros(pixels.shape), np.zeros((0, 0))
         for is_last in (False, True):
             # OpenCV gives None where it finds none, whatever its types say.
             found, _ = cv2.findHomography(plane, pixels - lens, 0)
             if found is None:  # pyright: ignore[reportUnnecessaryComparison]
                 return None
             homography = np.asarray(found, dtype=np.float64)
-            flat = _centroids(homography, plane, radii)
+            flat, outlines = _outlines(homography, plane, radii)
             if len(plane) >= POINTS_OF_POLYNOMIALS:
                 # What another homography would change is in the polynomials, too.
                 return cls(pixels - flat, _polynomials(pixels))
-            parts = _of_homography(homography, plane, flat), _of_lens(flat, size_px)
+            parts = _of_homography(homography, plane, flat), _of_lens(flat, outlines, size_px)
             columns = np.concatenate(parts, axis=2)[:, :, : len(plane) + 4].reshape(2 * len(plane), -1)
             if not is_last:
                 # A lens bends what is seen without it, and a homography is of that.
@@ -88,13 +90,24 @@ def _within(values: FloatArray, size: FloatArray | float) -> FloatArray:
     return (2 * values - values.min(axis=0) - values.max(axis=0)) / size
 
 
-def _centroids(homography: FloatArray, plane: FloatArray, radii: FloatArray) -> FloatArray:
-    """Return the centres (N, 2) of the ellipses that circles (N, 2) of radii (N,) are seen as."""
+def _outlines(
+    homography: FloatArray, plane: FloatArray, radii: FloatArray
+) -> tuple[FloatArray, FloatArray | None]:
+    """Return the centres (N, 2) of the ellipses that circles (N, 2) of radii (N,) are seen as, and half axes.
+
+    Those are two conjugate ones (N, 2, 2) of each; None where there are no circles.
+    """
     middle = np.column_stack([plane, np.ones(len(plane))]) @ homography.T
     axes = homography[:, :2]
-    # Third column of the dual conics.
-    dual = middle * middle[:, 2:] - (radii**2)[:, np.newaxis] * (axes @ axes[2])
-    return dual[:, :2] / dual[:, 2:]
+    # Dual conics.
+    dual = middle[:, :, np.newaxis] * middle[:, np.newaxis] - (radii**2)[:, np.newaxis, np.newaxis] * (
+        axes @ axes.T
+    )
+    centres = dual[:, :2, 2] / dual[:, 2:, 2]
+    if not radii.any():
+        return centres, None
+    shapes = centres[:, :, np.newaxis] * centres[:, np.newaxis] - dual[:, :2, :2] / dual[:, 2:, 2:]
+    return centres, np.asarray(np.linalg.cholesky(shapes), dtype=np.float64).swapaxes(1, 2)
 
 
 def _polynomials(pixels: FloatArray) -> FloatArray:
@@ -116,9 +129,27 @@ def _of_homography(homography: FloatArray, plane: FloatArray, flat: FloatArray) 
     return columns
 
 
-def _of_lens(flat: FloatArray, size_px: tuple[int, int]) -> FloatArray:
-    """Return what the terms of an ordinary lens change (N, 2, 7) of points (N, 2), the most usual first."""
-    away = (2 * flat - np.array(size_px) + 1) / max(size_px)
+def _of_lens(flat: FloatArray, outlines: FloatArray | None, size_px: tuple[int, int]) -> FloatArray:
+    """Return what the terms of an ordinary lens change (N, 2, 7) of points (N, 2), the most usual first.
+
+    Of a circle they move the centroid of its area: by the mean over its outline (half axes (N, 2, 2)) of the
+    way from the centre, times how far a term moves it outwards.
+    """
+    if outlines is None:
+        return _moved(flat, size_px)
+    turn = 2 * np.pi * np.arange(AROUND) / AROUND
+    out = np.column_stack([np.cos(turn), np.sin(turn)])
+    moves = _moved((flat[:, np.newaxis] + out @ outlines).reshape(-1, 2), size_px)
+    # In coordinates in which the ellipse is the unit circle.
+    seen = np.linalg.solve(outlines.swapaxes(1, 2)[:, np.newaxis], moves.reshape(len(flat), AROUND, 2, -1))
+    outwards = np.einsum("ai,naik->nak", out, seen)
+    round_ = 2 * np.einsum("ai,nak->nik", out, outwards) / AROUND
+    return np.asarray(outlines.swapaxes(1, 2) @ round_, dtype=np.float64)
+
+
+def _moved(places: FloatArray, size_px: tuple[int, int]) -> FloatArray:
+    """Return where the terms of an ordinary lens move (N, 2, 7) places (N, 2)."""
+    away = (2 * places - np.array(size_px) + 1) / max(size_px)
     squares, axes = (away**2).sum(axis=1, keepdims=True), np.eye(2)
     # Two radial terms, and what they change as the centre moves; of the first these are the tangential ones.
     first = [2 * away[:, [k]] * away + squares * axes[k] for k in (0, 1)]

@@ -39,6 +39,8 @@ LARGER = 1.5
 OFF_PX, OFF_SHARE, LEAST_MEASURED = 0.6, 0.02, 0.6
 # Its area may differ by this share from what those of the others tell, or by so many times what is usual.
 SIZE_OFF, SIZE_OFF_SPREADS, FEWEST_FOR_SIZES = 0.015, 5.0, 16
+# What circles' pictures tell of their variances may be wrong by so much, up or down: it knows no noise.
+USUAL_FACTOR = 10.0
 # A circle further from where it was expected, as a share of the root of its area, or of another size, is
 # something else.
 ASTRAY_SHARE, AREA_RATIO = 0.3, 1.5
@@ -88,7 +90,7 @@ def confirm(image: Image, target: CircleGrid, board: Aligned) -> Detection | Non
         if _marked_ratio(target, spots, found.shapes) < MARKED_RATIO:
             return None
     kept = found.take(np.flatnonzero(good))
-    return stated(image, target, ids[good], kept.centres, sigmas_px(image, kept))
+    return stated(image, target, ids[good], kept.centres, sigmas_px(image, kept), usual_factor=USUAL_FACTOR)
 
 
 def _fit_others(target: CircleGrid, ids: IndexArray, circles: Spots) -> NDArray[np.bool_]:
@@ -236,7 +238,7 @@ def _measured(
     if len(ids) < LEAST_MEASURED * target.point_count:
         return NotFound(Reason.INCOMPLETE, f"only {len(ids)} of {target.point_count} circles can be measured")
     kept = Spots(pixels[chosen[ids]], shapes[chosen[ids]])
-    return stated(image, target, ids, kept.centres, sigmas_px(image, kept))
+    return stated(image, target, ids, kept.centres, sigmas_px(image, kept), usual_factor=USUAL_FACTOR)
 
 
 def _marked_ratio(target: CircleGrid, chosen: IndexArray, shapes: FloatArray) -> float:

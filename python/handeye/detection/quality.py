@@ -6,6 +6,7 @@ The fewer the points, the more what is usual counts.
 """
 
 from dataclasses import dataclass
+from math import lgamma
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,9 @@ from handeye.detection.bent_board import BentBoard
 from handeye.types import Target
 from handeye.types.arrays import FloatArray, IndexArray
 
-# What is usual may be wrong by a power of ten, up or down: a variance that so many measurements tell is known
-# as well.
-USUAL_COUNT = 2 / np.log(10) ** 2
+# Variances that corners' own pictures tell are usually right to this factor, up or down. What fewer
+# measurements tell is spread without bounds.
+USUAL_FACTOR, LEAST_COUNT = 2.0, 3.0
 # No point is better.
 LEAST_PX = 0.001
 # Squared distances over variances of both coordinates that one point in ten thousand exceeds: it lies astray.
@@ -38,19 +39,23 @@ class Scatter:
         Mean square over the variances that were expected, and how many coordinates it is of.
     kept
         (N,) which points fit.
+    held
+        (N,) share of each point's own error that the view follows.
     squares
         (N,) squared distances in px^2 of the points from the view.
-    shares, covariance
-        (K, C) of each column of the board how much is in the view, and (K, K) how well that is known for
-        coordinates of the variances that were expected.
+    shares
+        (K, C) of each column of the board how much is in the view.
+    solving
+        (K, R) by which the rows of the points, over the deviations that were expected, tell those shares.
     """
 
     factor: float
     freedom: int
     kept: NDArray[np.bool_]
+    held: FloatArray
     squares: FloatArray
     shares: FloatArray
-    covariance: FloatArray
+    solving: FloatArray
 
 
 def scatter(board: BentBoard, sigmas: FloatArray) -> Scatter | None:
@@ -90,10 +95,26 @@ def _about(
     factor = float(squares[kept].sum()) / freedom
     # The median of squared distances in two dimensions is so many of their variances.
     usual = float(np.median(squares[kept] / free[kept])) / (2 * np.log(2))
+    every = np.zeros((len(solving), len(rows)))
+    every[:, rows] = solving @ left[:, told].T
     excess = squares / np.maximum(ASTRAY * usual * free, 1e-30)
-    found = Scatter(factor, freedom, kept, squares * sigmas**2, shares, solving @ solving.T)
+    found = Scatter(factor, freedom, kept, held, squares * sigmas**2, shares, every)
     # The worst first: it drags those around it.
     return found, excess <= np.where(kept, max(1.0, WORST_SHARE * float(excess[kept].max())), 1.0)
+
+
+def _scale(found: Scatter, usual_factor: float) -> FloatArray:
+    """Return by what (N,) to multiply variances, so that squared errors over them are one on average.
+
+    What is usual and what was found are weighed by how well each is known, their logarithms. A mean square of
+    few is spread; an error goes along with it as far as it is left over itself.
+    """
+    count = max(found.freedom + 2 / np.log(usual_factor) ** 2, LEAST_COUNT)
+    share, half = found.freedom / count, found.freedom / 2
+    # The mean of a power of a mean square of independent normal errors.
+    spread = half**share * np.exp(lgamma(half - share) - lgamma(half))
+    left = 1 - found.held.clip(None, 1.0)
+    return np.asarray(found.factor**share * spread * (1 - 2 * left / count), dtype=np.float64)
 
 
 def stated(
@@ -103,20 +124,19 @@ def stated(
     pixels: FloatArray,
     sigmas_px: FloatArray,
     shared_px: FloatArray | float = 0.0,
+    usual_factor: float = USUAL_FACTOR,
 ) -> Detection:
     """Return points (N, 2) as a detection whose standard deviations fit how they lie on the board.
 
-    Up to then those (N,) may be wrong by a factor, the same for all points. Deviations that all points
-    share, so that they do not show, are added.
+    Up to then those (N,) may be wrong by a factor, the same for all points; usually no further than one of
+    their squares. Deviations that all points share, so that they do not show, are added.
     """
     plane, radii = target.points[point_ids, :2], target.radii_m[point_ids]
     board = BentBoard.of(plane, radii, pixels, (image.shape[1], image.shape[0]))
     variances = sigmas_px**2
     found = None if board is None else scatter(board, sigmas_px)
     if found is not None:
-        count = found.freedom + USUAL_COUNT
-        # Logarithms are weighed. What so few tell is spread as Student's t, whose variance is larger.
-        variances = variances * found.factor ** (found.freedom / count) * count / max(count - 2, 1.0)
+        variances = variances * _scale(found, usual_factor)
         # A point that lies astray was measured worse than its picture tells.
         variances = np.where(found.kept, variances, np.maximum(variances, found.squares / 2))
     sigmas = np.maximum(np.sqrt(variances), LEAST_PX)
