@@ -23,23 +23,39 @@ def test_views_bend_a_board_as_lenses_do(name: str, lens: str) -> None:
     bent = BentBoard.of(plane, radii, board.pixels, SIZE_PX)
     assert bent is not None
     assert bent.freedom > 0
-    assert np.abs(bent.left(bent.off)).max() < 0.004
+    # Of circles the lens moves the centroids of their areas, not the images of their centres.
+    assert np.abs(bent.left(bent.off)).max() < (0.0002 if name in FEW else 0.004)
 
 
-@pytest.mark.parametrize("name", ["corners", "chessboard", "aruco grid"])
-def test_deviations_fit_how_points_scatter(name: str) -> None:
+# What the points' own pictures tell is some times too much; few points leave it at that for the most part.
+@pytest.mark.parametrize(("name", "times"), [("corners", 1.0), ("chessboard", 3.0), ("aruco grid", 3.0)])
+def test_deviations_fit_how_points_scatter(name: str, times: float) -> None:
     board = scene((TARGETS | FEW)[name], CAMERAS["brown_conrady_4"], share=0.5)
     random = np.random.default_rng(8)
     ids, ratios = np.arange(board.target.point_count), list[float]()
     sigmas = random.uniform(0.01, 0.04, len(ids))
     for _ in range(200):
         off = sigmas[:, np.newaxis] * random.normal(size=(len(ids), 2))
-        # What the points' own pictures tell is three times too much.
-        found = stated(NO_IMAGE, board.target, ids, board.pixels + off, 3 * sigmas)
+        found = stated(NO_IMAGE, board.target, ids, board.pixels + off, times * sigmas)
         assert found.sigmas_px is not None
         off = found.pixels - board.pixels[found.point_ids]
         ratios.extend(((off / found.sigmas_px[:, np.newaxis]) ** 2).ravel())
-    assert 0.8 < np.mean(ratios) < 1.15
+    assert 0.8 < np.mean(ratios) < 1.1
+
+
+@pytest.mark.parametrize("count", [5, 6, 8, 12])
+def test_deviations_of_few_points_are_right_on_average(count: int) -> None:
+    board = scene(FEW["corners"], share=0.5)
+    random = np.random.default_rng(9)
+    ratios: list[float] = []
+    for _ in range(600):
+        ids = np.sort(random.permutation(12)[:count])
+        off = 0.02 * random.normal(size=(count, 2))
+        found = stated(NO_IMAGE, board.target, ids, board.pixels[ids] + off, np.full(count, 0.02))
+        assert found.sigmas_px is not None
+        off = found.pixels - board.pixels[found.point_ids]
+        ratios.extend(((off / found.sigmas_px[:, np.newaxis]) ** 2).ravel())
+    assert 0.92 < np.mean(ratios) < 1.08
 
 
 @pytest.mark.parametrize("which", [0, 53])
@@ -70,3 +86,12 @@ def test_bits_tell_how_far_the_edges_of_few_markers_have_moved(target: Target, g
     # Edges have moved by a quarter and a third of a pixel.
     assert board.errors_px(found).max() < 0.12
     assert found.sigmas_px.max() < 0.06
+
+
+@pytest.mark.parametrize("gamma", [0.45, 2.2])
+def test_small_windows_of_bits_do_not_tell_that_edges_have_moved_less(gamma: float) -> None:
+    board = scene(ArucoGrid(1, 3, 0.03, 0.006, "DICT_5X5_100"), turn=(0.2, -0.2, 0.1), share=0.4)
+    light = cv2.GaussianBlur(board.picture().astype(np.float64), (0, 0), 0.7)
+    found = detect(np.rint(255 * (light / 255) ** gamma).astype(np.uint8), board.target)
+    assert isinstance(found, Detection), found
+    assert board.rms_px(found) < 0.02

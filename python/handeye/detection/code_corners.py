@@ -12,6 +12,7 @@ import numpy as np
 from handeye import _core
 from handeye.detection.base import Image
 from handeye.detection.corner_fit import CornerKind, clear_bands, corner_fits
+from handeye.detection.edge_shift import Corners
 from handeye.pattern import Pattern
 from handeye.types.arrays import FloatArray, IndexArray
 from handeye.types.target import MarkerCorners
@@ -19,6 +20,8 @@ from handeye.types.target.dictionaries import marker_bits
 
 # How much of a cell the window of a corner takes, and the cells that are large enough for one.
 WINDOW_SHARE, LEAST_CELL_PX = 0.45, 6.0
+# So many corners of bits tell, together with those of the markers.
+FEWEST = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +55,10 @@ def cell_m(target: MarkerCorners) -> float:
 
 @lru_cache(maxsize=64)
 def _printed(target: MarkerCorners, marker: int) -> CodeCorners:
-    """Return the corners of the bits of one marker."""
+    """Return the corners of the bits of one marker, and its own."""
     cell, cells = cell_m(target), marker_bits(target.dictionary) + 2 * target.border_bits
     low = target.points[4 * marker : 4 * marker + 4, :2].min(axis=0)
-    nodes = low + cell * np.stack(np.meshgrid(*[np.arange(1, cells)] * 2), axis=-1).reshape(-1, 2)
+    nodes = low + cell * np.stack(np.meshgrid(*[np.arange(cells + 1)] * 2), axis=-1).reshape(-1, 2)
     # To the upper left, upper right, lower left and lower right.
     around = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])
     dark = Pattern(target).is_dark((nodes[:, np.newaxis] + cell / 2 * around).reshape(-1, 2)).reshape(-1, 4)
@@ -69,13 +72,17 @@ def _printed(target: MarkerCorners, marker: int) -> CodeCorners:
 
 def code_corners(
     image: Image, target: MarkerCorners, markers: IndexArray, lens: _core.PlaneMap, blur_px: float
-) -> tuple[CodeCorners, FloatArray]:
-    """Return those corners of the bits of markers (M,) that can be measured, and where (K, 2) they are."""
+) -> Corners | None:
+    """Return those corners of the bits of markers (M,) that can be measured; None if there are too few.
+
+    The markers' own corners are among them, measured in windows as small as those of the bits.
+    """
     parts = [_printed(target, int(m)) for m in markers]
     corners = CodeCorners(
         *(np.concatenate([getattr(p, name) for p in parts]) for name in ("plane", "sides", "signs"))
     )
     cell, places = cell_m(target), lens.pixels(corners.plane)
+    sigmas = np.zeros(0)
     # Twice: a lens moves what lies between the corners of a large marker.
     for is_last in (False, True):
         steps = lens.steps(corners.plane, cell / 2)
@@ -93,7 +100,11 @@ def code_corners(
             rough=not is_last,
         )
         good = np.flatnonzero(~fits.spoilt() & (height >= LEAST_CELL_PX))
-        corners, places = corners.take(good), fits.places[good]
+        corners, places, sigmas = corners.take(good), fits.places[good], fits.sigmas_px[good]
         again = _core.PlaneMap.fitted(corners.plane, places) if len(good) >= 4 else None
         lens = lens if again is None else again
-    return corners, places
+    if len(places) < FEWEST + 4 * len(markers):
+        return None
+    sides = corners.sides @ lens.steps(corners.plane, cell / 2)
+    sides /= np.linalg.norm(sides, axis=2, keepdims=True)
+    return Corners(corners.plane, places, sides, corners.signs, sigmas)

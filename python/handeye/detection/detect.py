@@ -20,7 +20,7 @@ from handeye.types.target import MarkerCorners
 
 SMALLEST_SIDE_PX = 24
 # To be raised with every change of what is detected, or where.
-VERSION = 11
+VERSION = 12
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ distance, which shows against the spaces between the markers. Where the blur rea
 code to its marker's sides, light ones move those, which shows likewise.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from handeye.detection.bent_board import BentBoard
@@ -19,8 +21,48 @@ FEWEST = 36
 LEAST_IN_SIGMAS, LARGEST_PX = 3.0, 1.5
 # How far edges usually lie elsewhere where nothing tells: cameras without gamma and with one together.
 USUAL_PX = 0.17
-# So many corners of bits tell, together with those of the markers.
-FEWEST_OF_BITS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Sharpened:
+    """Corners of a few markers where they would be had the edges not moved.
+
+    Attributes
+    ----------
+    pixels
+        (N, 2) places.
+    sigmas_px
+        (N,) deviations of what the corners do not share, still to be compared with how they lie.
+    shared_px
+        (N,) deviations by what is not known of the edges.
+    """
+
+    pixels: FloatArray
+    sigmas_px: FloatArray
+    shared_px: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """Corners of markers or of their bits.
+
+    Attributes
+    ----------
+    plane, pixels
+        (N, 2) places on the board and in the image.
+    sides
+        (N, 2, 2) unit directions in the image of the edges of the dark or light part, from its corner on.
+    signs
+        (N,) 1 where that part is dark, -1 where it is light.
+    sigmas_px
+        (N,) deviations of the places.
+    """
+
+    plane: FloatArray
+    pixels: FloatArray
+    sides: FloatArray
+    signs: FloatArray
+    sigmas_px: FloatArray
 
 
 def outwards(sides: FloatArray, shares: FloatArray) -> FloatArray:
@@ -34,29 +76,50 @@ def outwards(sides: FloatArray, shares: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("nsk,nsi->kni", shares, moves), dtype=np.float64)
 
 
-def shift_of_few(
-    plane: FloatArray, pixels: FloatArray, size_px: tuple[int, int], sides: FloatArray, signs: FloatArray
-) -> tuple[float, float]:
-    """Return by how many pixels edges lie too far outwards of what is dark, and the deviation of that.
+def sharpened(own: Corners, bits: Corners | None, size_px: tuple[int, int]) -> Sharpened:
+    """Return the corners of a few markers as if edges had not moved, which the corners of their bits tell.
+
+    How far a corner goes with its edges depends on the window that it was fitted in, as it is rounder than
+    the picture fitted. Those of bits are smaller; the markers' corners are among them once more, measured so.
 
     Parameters
     ----------
-    plane, pixels
-        (N, 2) corners of markers and of their bits on the board and in the image.
+    own, bits
+        Corners of the markers (N), and those of bits; None where those do not tell.
     size_px
         Width and height of the image.
-    sides
-        (N, 2, 2) unit directions in the image of the edges of the dark or light part, from its corner on.
-    signs
-        (N,) 1 where that part is dark, -1 where it is light.
     """
+    moves = outwards(own.sides, np.ones((len(own.plane), 2, 1)))[0]
+    told = None if bits is None else _shift(own, bits, size_px)
+    if told is None:
+        return Sharpened(own.pixels, own.sigmas_px, USUAL_PX * np.sqrt((moves**2).mean(axis=1)))
+    shift, solving, factor = told
+    # The shift follows the corners themselves in part, so that less is left of their own errors.
+    changes = moves / own.sigmas_px[:, np.newaxis]
+    left = 1 - 2 * changes * solving[: 2 * len(moves)].reshape(-1, 2) + changes**2 * float(solving @ solving)
+    # What the corners of bits show is wrong with the markers' as well: edges along the rows of pixels, say.
+    sigmas = own.sigmas_px * np.sqrt(max(factor, 1.0) * left.mean(axis=1))
+    return Sharpened(own.pixels - shift * moves, sigmas, np.zeros(len(moves)))
+
+
+def _shift(own: Corners, bits: Corners, size_px: tuple[int, int]) -> tuple[float, FloatArray, float] | None:
+    """Return by how many pixels edges lie too far outwards of what is dark, as corners of markers show.
+
+    Also how the coordinates (R,) of all corners over their deviations tell that, and the mean square of
+    what is left over what was expected.
+    """
+    plane, pixels, sides, signs, sigmas = (
+        np.concatenate([getattr(own, name), getattr(bits, name)]) for name in Corners.__dataclass_fields__
+    )
     board = BentBoard.of(plane, np.zeros(len(plane)), pixels, size_px)
     # Two edges that cross look differently where the smaller part is dark and where it is light.
-    shares = np.stack([signs.clip(0), signs.clip(None, 0)], axis=1)[:, np.newaxis].repeat(2, axis=1)
-    found = None if board is None else scatter(board.joined(outwards(sides, shares)), np.ones(len(plane)))
-    if found is None or abs(found.shares[-2, 0]) > LARGEST_PX:
-        return 0.0, USUAL_PX
-    return float(found.shares[-2, 0]), float(np.sqrt(found.factor * found.covariance[-2, -2]))
+    is_own = np.arange(len(plane)) < len(own.plane)
+    kinds = np.stack([is_own, ~is_own & (signs > 0), ~is_own & (signs < 0)], axis=1) * signs[:, np.newaxis]
+    shares = kinds[:, np.newaxis].repeat(2, axis=1).astype(np.float64)
+    found = None if board is None else scatter(board.joined(outwards(sides, shares)), sigmas)
+    if found is None or abs(found.shares[-3, 0]) > LARGEST_PX:
+        return None
+    return float(found.shares[-3, 0]), found.solving[-3], found.factor
 
 
 def without_edge_shift(

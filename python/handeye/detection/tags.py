@@ -7,7 +7,7 @@ import numpy as np
 
 from handeye import _core
 from handeye.detection.base import Detection, Image, NotFound, Reason, inside
-from handeye.detection.code_corners import cell_m, code_corners
+from handeye.detection.code_corners import code_corners
 from handeye.detection.corner_fit import (
     ASTRAY_PX,
     BAND_SHARE,
@@ -23,14 +23,7 @@ from handeye.detection.corner_fit import (
     spread,
 )
 from handeye.detection.diagnosis import diagnose
-from handeye.detection.edge_shift import (
-    FEWEST,
-    FEWEST_OF_BITS,
-    USUAL_PX,
-    outwards,
-    shift_of_few,
-    without_edge_shift,
-)
+from handeye.detection.edge_shift import FEWEST, Corners, sharpened, without_edge_shift
 from handeye.detection.marker_lattice import contradiction
 from handeye.detection.marker_sides import side_meetings
 from handeye.detection.markers import (
@@ -61,7 +54,7 @@ FEWEST_TAGS = 2
 # further from where sides meet than this many of the latter's deviations.
 FEW_MARKERS, MEETING_SIGMAS = 3, 3.0
 # Where edges meet at a sharp angle, corners go further than edges: of few markers they are not known to this.
-LARGEST_SHARED_PX = 0.5
+LARGEST_SIGMA_PX = 0.5
 # Numbers of the map from a board to a picture, and the least deviation of the directions that it tells.
 OF_MAP, LEAST_TURN = 22, 1e-3
 # Cells of the code along a side that show at its corner where they are blurred.
@@ -193,23 +186,13 @@ def _stated(
         return stated(image, target, ids, sharp, sigmas[good])
     if _is_touched(target):
         return stated(image, target, ids, pixels, sigmas[good])
-    shift, sigma = 0.0, USUAL_PX
+    own = Corners(plane, pixels, sides, np.ones(len(plane)), sigmas[good])
     lens = _core.PlaneMap.fitted(plane, pixels)
-    if lens is not None:
-        bits, seen = code_corners(image, target, tags, lens, blur_px)
-        if len(bits.plane) >= FEWEST_OF_BITS:
-            shift, sigma = shift_of_few(
-                np.concatenate([plane, bits.plane]),
-                np.concatenate([pixels, seen]),
-                size,
-                np.concatenate([sides, _unit(bits.sides @ lens.steps(bits.plane, cell_m(target) / 2))]),
-                np.concatenate([np.ones(len(plane)), bits.signs]),
-            )
-    moves = outwards(sides, np.ones((len(sides), 2, 1)))[0]
-    shared = sigma * np.sqrt((moves**2).mean(axis=1))
-    if shared.max() > LARGEST_SHARED_PX:
+    bits = None if lens is None else code_corners(image, target, tags, lens, blur_px)
+    sharp = sharpened(own, bits, size)
+    if np.hypot(sharp.sigmas_px, sharp.shared_px).max() > LARGEST_SIGMA_PX:
         return None
-    return stated(image, target, ids, pixels - shift * moves, sigmas[good], shared)
+    return stated(image, target, ids, sharp.pixels, sharp.sigmas_px, sharp.shared_px)
 
 
 def _markers(image: Image, target: MarkerCorners) -> Seen:
