@@ -23,6 +23,7 @@ OTHERS: dict[str, Target] = {
     "ChArUco, inverted": Charuco(7, 10, 0.03, 0.0225, "DICT_5X5_100", inverted=True),
     "ArUco grid, inverted": ArucoGrid(5, 7, 0.03, 0.006, "DICT_5X5_100", inverted=True),
     "chessboard, 3 x 4": Chessboard(3, 4, 0.03),
+    "ChArUco, 4 x 4": Charuco(4, 4, 0.03, 0.0225, "DICT_5X5_100"),
     "circle grid, 4 x 3": CircleGrid(4, 3, 0.03, 0.015),
     "three ArUco markers": ArucoGrid(1, 3, 0.03, 0.006, "DICT_5X5_100"),
     "ArUco marker": ArucoMarker(0.06, "DICT_5X5_100", 3),
@@ -44,6 +45,7 @@ LOOKS: dict[str, dict[str, float]] = {
 def quality(targets: dict[str, Target], firsts: list[int], views: int, few: int) -> None:
     """Print squared errors over stated variances, for each family and look, and median deviations.
 
+    Beside each mean is its standard error, as the means of the views tell it: points of a view go together.
     Views are those from each of some numbers on; of targets with few points, `few` times as many.
     """
     print("| target | " + " | ".join(LOOKS) + " | all |\n|---" + "|---" * (len(LOOKS) + 1) + "|")
@@ -51,10 +53,10 @@ def quality(targets: dict[str, Target], firsts: list[int], views: int, few: int)
         # Finely, as edges along the rows of pixels are otherwise drawn up to a sixteenth of a pixel off.
         renderer = BoardRenderer(CAMERA, target, Appearance(supersampling=16))
         cells: list[str] = []
-        everything: list[float] = []
+        everything: list[np.ndarray] = []
         drawn: dict[int, np.ndarray] = {}
         for look in LOOKS.values():
-            ratios: list[float] = []
+            ratios: list[np.ndarray] = []
             sigmas: list[float] = []
             count = views * (few if target.point_count < FEW_POINTS else 1)
             for view in [first + k for first in firsts for k in range(count)]:
@@ -69,11 +71,18 @@ def quality(targets: dict[str, Target], firsts: list[int], views: int, few: int)
                 squares = [
                     ((found.pixels - truth[p[found.point_ids]]) ** 2).sum(axis=1) for p in target.symmetries
                 ]
-                ratios.extend(min(squares, key=np.sum) / 2 / found.sigmas_px**2)
+                ratios.append(min(squares, key=np.sum) / 2 / found.sigmas_px**2)
                 sigmas.extend(found.sigmas_px)
-            cells.append(f"{np.mean(ratios):.2f} ({np.median(sigmas):.3f} px)")
+            cells.append(f"{mean_of(ratios)} ({np.median(sigmas):.3f} px)")
             everything.extend(ratios)
-        print(f"| {name} | {' | '.join(cells)} | {np.mean(everything):.2f} |", flush=True)
+        print(f"| {name} | {' | '.join(cells)} | {mean_of(everything)} |", flush=True)
+
+
+def mean_of(views: list[np.ndarray]) -> str:
+    """The mean of all values of some views and its standard error, in words."""
+    counts, sums = (np.array([f(v) for v in views], dtype=np.float64) for f in (len, np.sum))
+    mean = sums.sum() / counts.sum()
+    return f"{mean:.2f} +- {np.linalg.norm(sums - mean * counts) / counts.sum():.2f}"
 
 
 def taken(image: np.ndarray, look: dict[str, float], random: np.random.Generator) -> np.ndarray:
