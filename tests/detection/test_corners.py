@@ -7,8 +7,10 @@ import pytest
 from handeye import _core
 from handeye.cameras.render import clutter
 from handeye.detection import Detection, NotFound, detect
+from handeye.detection.markers import NO_IDS, Seen
 from handeye.detection.saddles import find_saddles
-from handeye.types import AprilGrid, ArucoGrid, Chessboard
+from handeye.detection.tags import measured
+from handeye.types import AprilGrid, ArucoGrid, ArucoMarker, Chessboard
 from scenes import CAMERAS, HEIGHT_PX, TARGETS, TILTED, WIDTH_PX, Scene, scene
 
 TURNS = ((0.35, -0.3, 0.2), (-0.5, 0.2, 1.4), (0.1, 0.6, -2.5))
@@ -162,3 +164,10 @@ def test_crossings_know_where_it_is_dark() -> None:
 def test_a_lone_crossing_has_no_neighbours() -> None:
     assert (_core.crossing_neighbours(np.zeros((1, 2)), np.array([[0.0, 1.5]]), 0.3) == -1).all()
     assert _core.crossing_neighbours(np.zeros((0, 2)), np.zeros((0, 2)), 0.3).shape == (0, 4)
+
+
+def test_an_outline_of_a_marker_with_two_corners_in_one_place_is_none() -> None:
+    target = ArucoMarker(0.1, "DICT_5X5_100", 3)
+    corners = np.array([[[100.0, 100.0], [100.0, 100.0], [160.0, 160.0], [100.0, 160.0]]])
+    outlines = Seen(np.array([3]), corners, NO_IDS)
+    assert isinstance(measured(scene(target).picture(), target, outlines), NotFound)

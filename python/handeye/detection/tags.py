@@ -278,7 +278,7 @@ def _turns(outlined: FloatArray, told: FloatArray) -> FloatArray:
 
 
 def _unit(directions: FloatArray) -> FloatArray:
-    return directions / np.linalg.norm(directions, axis=2, keepdims=True)
+    return directions / np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-12)
 
 
 def _measured(
