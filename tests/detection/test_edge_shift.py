@@ -35,6 +35,7 @@ def test_corners_scatter_as_stated_once_their_edges_are_put_right(worse: float) 
         bits = corners(np.concatenate([BITS, OWN]), signs, SMALL_WINDOWS_PX, 0.03, off[4:])
         found = sharpened(own, bits, (WIDTH_PX, HEIGHT_PX))
         assert not found.shared_px.any()
+        assert found.open_px.max() < 0.06
         truth = OWN @ AXES + [WIDTH_PX / 2, HEIGHT_PX / 2]
         ratios.extend((((found.pixels - truth) / found.sigmas_px[:, np.newaxis]) ** 2).ravel())
     # Bits that scatter less than their pictures tell leave the markers' corners as they are.

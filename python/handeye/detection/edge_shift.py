@@ -34,12 +34,15 @@ class Sharpened:
     sigmas_px
         (N,) deviations of what the corners do not share, still to be compared with how they lie.
     shared_px
-        (N,) deviations by what is not known of the edges.
+        (N,) deviations that are to be added, as nothing tells how far the edges have moved.
+    open_px
+        (N,) deviations by what is not known of that, told or not.
     """
 
     pixels: FloatArray
     sigmas_px: FloatArray
     shared_px: FloatArray
+    open_px: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,16 +93,20 @@ def sharpened(own: Corners, bits: Corners | None, size_px: tuple[int, int]) -> S
         Width and height of the image.
     """
     moves = outwards(own.sides, np.ones((len(own.plane), 2, 1)))[0]
+    away = np.sqrt((moves**2).mean(axis=1))
     told = None if bits is None else _shift(own, bits, size_px)
     if told is None:
-        return Sharpened(own.pixels, own.sigmas_px, USUAL_PX * np.sqrt((moves**2).mean(axis=1)))
+        return Sharpened(own.pixels, own.sigmas_px, USUAL_PX * away, USUAL_PX * away)
     shift, solving, factor = told
+    variance = float(solving @ solving)
     # The shift follows the corners themselves in part, so that less is left of their own errors.
     changes = moves / own.sigmas_px[:, np.newaxis]
-    left = 1 - 2 * changes * solving[: 2 * len(moves)].reshape(-1, 2) + changes**2 * float(solving @ solving)
+    left = 1 - 2 * changes * solving[: 2 * len(moves)].reshape(-1, 2) + changes**2 * variance
     # What the corners of bits show is wrong with the markers' as well: edges along the rows of pixels, say.
     sigmas = own.sigmas_px * np.sqrt(max(factor, 1.0) * left.mean(axis=1))
-    return Sharpened(own.pixels - shift * moves, sigmas, np.zeros(len(moves)))
+    return Sharpened(
+        own.pixels - shift * moves, sigmas, np.zeros(len(moves)), np.sqrt(factor * variance) * away
+    )
 
 
 def _shift(own: Corners, bits: Corners, size_px: tuple[int, int]) -> tuple[float, FloatArray, float] | None:

@@ -54,7 +54,7 @@ FEWEST_TAGS = 2
 # further from where sides meet than this many of the latter's deviations.
 FEW_MARKERS, MEETING_SIGMAS = 3, 3.0
 # Where edges meet at a sharp angle, corners go further than edges: of few markers they are not known to this.
-LARGEST_SIGMA_PX = 0.5
+LARGEST_OPEN_PX = 0.5
 # Numbers of the map from a board to a picture, and the least deviation of the directions that it tells.
 OF_MAP, LEAST_TURN = 22, 1e-3
 # Cells of the code along a side that show at its corner where they are blurred.
@@ -190,7 +190,7 @@ def _stated(
     lens = _core.PlaneMap.fitted(plane, pixels)
     bits = None if lens is None else code_corners(image, target, tags, lens, blur_px)
     sharp = sharpened(own, bits, size)
-    if np.hypot(sharp.sigmas_px, sharp.shared_px).max() > LARGEST_SIGMA_PX:
+    if sharp.open_px.max() > LARGEST_OPEN_PX:
         return None
     return stated(image, target, ids, sharp.pixels, sharp.sigmas_px, sharp.shared_px)
 
