@@ -43,7 +43,7 @@ T_SAFETY, T_JOURNAL, T_CALLS = (
 )
 T_READING, T_FOLDER, T_MANUAL = "robots/test_reading.py", "cameras/test_folder.py", "robots/test_manual.py"
 T_RULES, T_LOOP, T_BREAKS = "session/test_rules.py", "session/test_loop.py", "session/test_breaks.py"
-T_RIG = "session/test_rig.py"
+T_RIG, T_WRONG_FIRST = "session/test_rig.py", "session/test_wrong_first_views.py"
 T_COLLISIONS = "planning/test_collisions.py"
 DECIDING, STEPPING, COMPARING = "session/deciding.py", "session/stepping.py", "session/comparing.py"
 SELF, T_SELF = "session/self_calibration.py", "session/test_self_calibration.py"
@@ -61,7 +61,7 @@ MUTANTS = (
     Mutant("tool takes part", SAFETY, "return Body(arm, workspace, mounted_points(believed), solids)", "return Body(arm, workspace, solids=solids)", T_SAFETY),
     Mutant("what is mounted with several cameras takes part", SAFETY, "return Body(arm, workspace, mounted_on_flange(believed), solids)", "return Body(arm, workspace, solids=solids)", T_RIG),
     Mutant("an arm goes back where its tool has no room", "session/rig_choosing.py", "            if joints is not None:\n", "            if False:\n", T_RIG),
-    Mutant("a wrong station keeps no rig from its answer", "session/rig.py", "(estimate is None or not all_agree(", "(estimate is not None and not all_agree(", T_RIG + "::wrong_station"),
+    Mutant("a wrong station keeps no rig from its answer", "session/rig.py", "estimate is not None and all_agree(", "estimate is None or all_agree(", T_RIG + "::wrong_station"),
     Mutant("a rig's turns go on to the next axis", "session/rig_choosing.py", "if whole or tries == 2:", "if whole:", T_RIG),
     Mutant("check before sending", ATTEMPT, "    if why is not None:\n        return Missed(Failure.MOTION_REFUSED", "    if False:\n        return Missed(Failure.MOTION_REFUSED", T_SAFETY),
     Mutant("a dry run moves nothing", "cli/run.py", "if dry_run or session is None:", "if session is None:", "end_to_end/test_run.py"),
@@ -109,6 +109,12 @@ MUTANTS = (
     Mutant("a driver's exit ends no session", CALLS, "except BaseException as error:  # noqa: BLE001 - whatever a driver raises", "except Exception as error:", T_CALLS),
     Mutant("a robot that hangs ends the session", STEPPING, "if self._cell.robot_calls.pending:", "if False:", T_SAFETY),
     Mutant("a session told to go on goes on", STEPPING, "self._forgiven_up_to = situation.entries[-1].number", "pass", T_SAFETY),
+    Mutant("a session without an answer goes on", STEPPING, "self._outvoted = situation.taken", "pass", T_WRONG_FIRST),
+    Mutant("until new views outvote the old", DECIDING, "2 * self.outvoted + 1", "self.outvoted + 1", T_WRONG_FIRST),
+    Mutant("in doubt no accuracy is reached", "session/rig_choosing.py", "if believed is not None and not situation.doubtful and", "if believed is not None and", T_RIG),
+    Mutant("no notation is blamed where joints tell the poses", "estimation/faults/alternatives.py", "if not (by_joints and h in OF_NUMBERS)", "if True", "estimation/faults/test_examine.py"),
+    Mutant("no board of another size", "estimation/rig_checks.py", "if not scale_is_bearable(scale, BEARABLE_ALONE):", "if False:", "estimation/test_rig.py"),
+    Mutant("no camera of another lens", "estimation/rig_checks.py", "prior, BEARABLE_ALONE):", "prior, 1e9):", "estimation/test_rig.py"),
     Mutant("views of other arms left out", LOOP, "if (len(view.joints_rad) == len(arm) if view.joints_rad is not None else not needed)", "if True", T_SAFETY),
     # Pictures of now.
     Mutant("stale frames", "cameras/capture.py", "STALE_FRAMES = 5", "STALE_FRAMES = 0", "cameras/test_capture.py"),

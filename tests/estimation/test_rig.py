@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handeye.errors import DegenerateError, InputError
+from handeye.errors import DegenerateError, InputError, SolveError
 from handeye.estimation import RigMeasurements, estimate_rig, solve, solve_rig
 from handeye.estimation.rig_checks import examine_rig
 from handeye.robots import ArmKinematics, open_arm
 from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.simulation.rigs import RigOptions, simulate_rig
-from handeye.types import CameraView, Chessboard, Mounting, Pose, RigRecording, Station
+from handeye.types import Camera, CameraView, Chessboard, Mounting, Pose, RigRecording, Station
 from handeye.validation import metrics
 
 KNOWN = ArmKinematics(open_arm("ur5e"))
@@ -234,3 +234,29 @@ def test_cameras_that_count_from_other_ends_of_a_board_are_brought_to_agree() ->
     assert recording.truth is not None
     for name, X in recording.truth.cameras.items():
         assert metrics.absolute_error(rig.cameras[name].X, X).translation_mm < 2.5
+
+
+def test_a_board_that_would_have_to_be_of_another_size_is_refused() -> None:
+    rig = simulate_rig(ErrorKind.MIXTURE_CELL, 0, seed=8)
+    halves = {
+        name: replace(mounted, target=Chessboard(board.rows, board.columns, 0.5 * board.pitch_m))
+        for name, mounted in rig.targets.items()
+        if isinstance(board := mounted.target, Chessboard)
+    }
+    assert halves.keys() == rig.targets.keys()
+    with pytest.raises(SolveError, match=r"target .* would be .* larger than stated"):
+        estimate_rig(RigMeasurements.of(replace(rig, targets=halves)), KNOWN, camera_fixed=True)
+
+
+def test_a_camera_that_would_have_to_be_another_is_refused() -> None:
+    rig = simulate_rig(ErrorKind.MIXTURE_CELL, 0, seed=8)
+    name, mounted = next(iter(rig.cameras.items()))
+    camera = mounted.camera
+    longer = Camera(
+        camera.lens,
+        camera.parameters * [1.2, 1.2, 1, 1, *np.ones(len(camera.parameters) - 4)],
+        *camera.size_px,
+    )
+    cameras = {**rig.cameras, name: replace(mounted, camera=longer)}
+    with pytest.raises(SolveError, match=f"focal length or centre of camera {name} would be off"):
+        estimate_rig(RigMeasurements.of(replace(rig, cameras=cameras)), KNOWN)

@@ -4,11 +4,18 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from handeye.codes import Code
 from handeye.errors import HandeyeError, InputError, SolveError
 from handeye.estimation.cell_fit import CellFit
 from handeye.estimation.faults import Examination, examine
-from handeye.estimation.faults.explanation import BEARABLE_ALONE, camera_is_bearable, scale_is_bearable
+from handeye.estimation.faults.explanation import (
+    BEARABLE_ALONE,
+    PINHOLE_PARAMETERS,
+    camera_is_bearable,
+    scale_is_bearable,
+)
 from handeye.estimation.measurements import Measurements
 from handeye.estimation.rig_measurements import Pair, RigMeasurements
 from handeye.types.rig import Body
@@ -72,12 +79,13 @@ def check_constants(fit: CellFit) -> None:
         The message names it.
     """
     advice = "check the motions, and the files of camera and target"
-    for name, camera in fit.cameras.items():
+    for name in fit.cameras:
         prior = fit.priors[name]
-        if not camera_is_bearable(fit.theta[fit.rows_of_camera(name)], prior, BEARABLE_ALONE):
+        shift = fit.theta[fit.rows_of_camera(name)] - prior.mean
+        if not camera_is_bearable(shift, prior, BEARABLE_ALONE):
             raise SolveError(
-                f"the views contradict one another: camera {name} would have a focal length of "
-                f"{camera.parameters[0]:.0f} px, and {prior.camera.parameters[0]:.0f} px are stated",
+                f"the views contradict one another: focal length or centre of camera {name} would be off by "
+                f"{np.abs(shift[:PINHOLE_PARAMETERS]).max():.0f} px",
                 hint=advice,
             )
     for name in fit.measurements.targets:

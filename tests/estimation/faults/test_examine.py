@@ -54,6 +54,19 @@ def test_a_mistake_of_all_views_is_refused(mistake: Mistake, number: int) -> Non
     assert caught.value.hint
 
 
+def test_where_joints_tell_the_poses_no_notation_is_blamed() -> None:
+    recording = made_up(0, 3)
+    turned = [
+        replace(view, T_base_flange=Pose.from_quaternion(T.translation, T.quaternion_xyzw * [1, 1, 1, -1]))
+        for view, T in ((view, view.T_base_flange) for view in recording.views)
+    ]
+    measurements = Measurements.of_recording(recording.with_views(turned))
+    for by_joints, code in ((False, "wrong_rotation"), (True, "inconsistent")):
+        with pytest.raises(InputError) as caught:
+            examine(measurements, by_joints=by_joints)
+        assert caught.value.code == code
+
+
 def shifted(recording: Recording, first: int, length: int) -> Recording:
     """The recording with some images in a row each filed with the pose of the view before."""
     views = list(recording.views)
