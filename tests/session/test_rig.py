@@ -11,7 +11,7 @@ import pytest
 from handeye.datasets import read_rig
 from handeye.errors import InputError
 from handeye.robots.protocol import Goal, Reading, Robot
-from handeye.session.deciding import EndReason
+from handeye.session.deciding import EndReason, Step
 from handeye.session.entry import Failure
 from handeye.session.faults import FaultRates
 from handeye.session.rig_prepared import begin_rig
@@ -45,6 +45,9 @@ def test_a_request_for_all_cameras_is_met_and_kept(tmp_path: Path) -> None:
         session, store = begin_rig(prepared, tmp_path / str(seed))
         end = session.run()
         phases = [entry.phase for entry in store.entries]
+        # The same in doubt has reached nothing.
+        situation = replace(session._situation(), doubtful=True)  # pyright: ignore[reportPrivateUsage]
+        assert isinstance(session._decide(situation), Step)  # pyright: ignore[reportPrivateUsage]
         store.close()
         assert end.reason is EndReason.ACCURACY_REACHED, seed
         assert end.calibration is not None
