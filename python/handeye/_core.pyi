@@ -519,8 +519,8 @@ class Predictor:
     """Predicts what candidate views would tell, at motions A (N, 4, 4).
 
     `robot_left`, `robot_right` (6, 6): square roots of the covariances of the robot's error on both sides of
-    A. `kinematic_count`: constants of the arm among the parameters. `arm` of the candidates: roots (N, 6,
-    r) of the noise of the joints on the left of A, and columns (N, 6, kinematic_count) of the constants;
+    A. `kinematic_count`: constants of the arm among the parameters. `arm` of the candidates, (N, 6,
+    kinematic_count + r) on the left of A: columns of the constants, then roots of the noise of the joints;
     without it the constants move nothing.
 
     >>> both = estimate.X.matrix, estimate.Y.matrix
@@ -557,7 +557,7 @@ class Predictor:
         criterion: Criterion,
         motions: ArrayLike,
         *,
-        arm: tuple[ArrayLike, ArrayLike] | None = None,
+        arm: ArrayLike | None = None,
         threads: int = 0,
         vector_unit: str | None = None,
     ) -> NDArray[float64]:
@@ -569,9 +569,7 @@ class Predictor:
     def in_sight(self, motions: ArrayLike) -> list[bool]:
         """Which candidates (N, 4, 4) would show enough of the target."""
 
-    def informations(
-        self, motions: ArrayLike, *, arm: tuple[ArrayLike, ArrayLike] | None = None
-    ) -> NDArray[float64]:
+    def informations(self, motions: ArrayLike, *, arm: ArrayLike | None = None) -> NDArray[float64]:
         """Information (N, n, n) of each candidate; zero where too little would be in sight."""
 
 # Estimation

@@ -151,17 +151,6 @@ fn vector_unit(py: Python<'_>, name: &str) -> PyResult<VectorUnit> {
         })
 }
 
-/// Roots `(N, 6, r)` of the noise of the joints, and columns `(N, 6, k)` of the arm's constants, per candidate.
-type ArmOfCandidates<'py> = (Array<'py>, Array<'py>);
-
-/// Matrices `(N, 6, m)` one after another, and m.
-fn columns<'a>(py: Python<'_>, array: &'a Array<'_>) -> PyResult<(std::borrow::Cow<'a, [f64]>, usize)> {
-    match *array.shape() {
-        [_, 6, count] => Ok((convert::in_place(array), count)),
-        _ => Err(invalid(py, "the arm of candidates must have shape (N, 6, m)")),
-    }
-}
-
 fn execution(py: Python<'_>, threads: usize, vector_unit: Option<&str>) -> PyResult<Execution> {
     let unit = vector_unit.map_or_else(|| Ok(VectorUnit::widest()), |name| self::vector_unit(py, name))?;
     Ok(Execution { unit, threads })
@@ -194,16 +183,23 @@ impl Predictor {
         &self,
         py: Python<'py>,
         motions: &Array<'py>,
-        arm: Option<&ArmOfCandidates<'py>>,
+        arm: Option<&Array<'py>>,
         look: impl FnOnce(&CandidateModel<'_>, Motions<'_>, Option<ArmColumns<'_>>) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
         let matrices = convert::row_major::<4, 4>(py, "motions", motions)?;
         let matrices: &[f64] = &matrices;
-        let noise = arm.map(|(noise, _)| columns(py, noise)).transpose()?;
-        let constants = arm.map(|(_, constants)| columns(py, constants)).transpose()?;
-        let arm = noise.as_ref().zip(constants.as_ref()).map(|((noise, of_noise), (constants, count))| {
-            ArmColumns { constants, noise, counts: (*count, *of_noise) }
-        });
+        let constants = self.kinematic_count;
+        let entries = arm.map(convert::in_place);
+        let arm = match (&entries, arm.map(Array::shape)) {
+            (None, _) => None,
+            (Some(entries), Some(&[_, 6, count])) if count >= constants => {
+                Some(ArmColumns { entries, counts: (constants, count - constants) })
+            }
+            _ => {
+                let expected = format!("the arm of candidates must have shape (N, 6, {constants} + r)");
+                return Err(invalid(py, &expected));
+            }
+        };
         match py.core(|| look(&self.model(), Motions::Matrices(matrices), arm))? {
             Ok(found) => Ok(found),
             Err(error @ Error::NotRigid { .. }) => {
@@ -287,7 +283,7 @@ impl Predictor {
         belief: &Belief,
         criterion: &PyCriterion,
         motions: Array<'py>,
-        arm: Option<ArmOfCandidates<'py>>,
+        arm: Option<Array<'py>>,
         threads: usize,
         vector_unit: Option<&str>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
@@ -311,7 +307,7 @@ impl Predictor {
         &self,
         py: Python<'py>,
         motions: Array<'py>,
-        arm: Option<ArmOfCandidates<'py>>,
+        arm: Option<Array<'py>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let n = self.model().parameter_count();
         let all = self.looked(py, &motions, arm.as_ref(), |model, motions, arm| {

@@ -22,6 +22,7 @@ from handeye.simulation.cells import CellOptions, ErrorKind, simulate, simulated
 from handeye.types import Camera, Recording, View
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import ModelName
+from handeye.types.pose import inverses
 
 VIEWS = 8
 CANDIDATES = 10_000
@@ -114,12 +115,7 @@ def _without_distortion(recording: Recording, seed: int) -> Recording:
 
 def _motions(joints: FloatArray) -> FloatArray:
     """(N, 4, 4) A of the chain of an eye in hand: inverses of the flange's poses."""
-    T = simulated_arm().forward(joints)
-    motions = np.zeros_like(T)
-    motions[:, :3, :3] = T[:, :3, :3].transpose(0, 2, 1)
-    motions[:, :3, 3:] = -motions[:, :3, :3] @ T[:, :3, 3:]
-    motions[:, 3, 3] = 1.0
-    return motions
+    return inverses(simulated_arm().forward(joints))
 
 
 def _gains(estimate: Estimate, motions: FloatArray, joints: FloatArray) -> FloatArray:

@@ -95,13 +95,14 @@ class ArmModel:
         self, mounting: Mounting, joints: FloatArray, joint_rad: float
     ) -> tuple[FloatArray, FloatArray]:
         """What the arm does to A on its left at joints (N, n): noise roots (N, 6, n), constants (N, 6, k)."""
-        scaled = self.kinematics.motion_jacobians(mounting, joints) * self.scales
-        by_link = self.kinematics.link_jacobians(mounting, joints)
-        count = len(self.free)
-        constants = np.empty((len(joints), 6, self.constants))
-        constants[:, :, :count] = scaled[:, :, list(self.free)]
-        constants[:, :, count:] = by_link[:, :, list(self.order)]
-        return scaled * joint_rad, constants
+        constants, roots = np.split(self.columns(mounting, joints, joint_rad), [self.constants], axis=2)
+        return roots, constants
+
+    def columns(self, mounting: Mounting, joints: FloatArray, joint_rad: float) -> FloatArray:
+        """(N, 6, k + n) of `candidates` side by side: the constants first."""
+        scaled = self.kinematics.joint_twists * self.scales
+        parts = (scaled[:, :, self.free], self.kinematics.link_twists[:, :, self.order], scaled * joint_rad)
+        return self.kinematics.displacements(mounting, joints, np.concatenate(parts, axis=2))
 
     @property
     def constants(self) -> int:

@@ -4,7 +4,7 @@ Nothing is estimated again. How much each component moves the measurements, in s
 pixels, and by how much the likelihood falls without it come with the posterior.
 """
 
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,24 +52,29 @@ class Levels:
     @classmethod
     def expected_noise(cls, posterior: _core.Posterior) -> StationNoise:
         """What is new at every station, root mean square over what the levels may be."""
-        nodes = [_new(dict(zip(posterior.level_names, levels, strict=True))) for levels in posterior.levels]
-        return _station_noise(np.sqrt(np.array(posterior.weights) @ np.square(nodes)).tolist())
+        nodes = _new(dict(zip(posterior.level_names, np.transpose(posterior.levels), strict=True)))
+        weights = np.array(posterior.weights)
+        return _station_noise([float(np.sqrt(np.sum(weights * np.square(levels)))) for levels in nodes])
 
     def station_noise(self) -> StationNoise:
         """What is new at every station; smooth errors of the posture count as new at another one."""
-        return _station_noise(_new(self.values))
+        return _station_noise([float(level) for level in _new(self.values)])
 
 
-def _twist(levels: dict[str, float], name: str) -> tuple[float, float]:
+# A level, or one for each set of levels.
+_Level = float | FloatArray
+
+
+def _twist(levels: Mapping[str, _Level], name: str) -> tuple[_Level, _Level]:
     """Translation (metres) and rotation (radians) of a component that is a twist."""
     rotation = levels.get(f"{name}_rad", 0.0)
     return rotation * levels.get(f"{name}_lever_m", 1.0), rotation
 
 
-def _new(levels: dict[str, float]) -> list[float]:
+def _new(levels: Mapping[str, _Level]) -> list[_Level]:
     """Translation and rotation at the flange, the same at the base, and the joints, as new at a station."""
     twists = [(_twist(levels, side), _twist(levels, f"posture_{side}")) for side in ("flange", "base")]
-    both = [math.hypot(white[i], smooth[i]) for white, smooth in twists for i in (0, 1)]
+    both = [np.hypot(white[i], smooth[i]) for white, smooth in twists for i in (0, 1)]
     return [*both, levels.get("joint_rad", 0.0)]
 
 

@@ -12,7 +12,7 @@ from handeye.errors import HandeyeError, InputError
 from handeye.types.arrays import FloatArray
 from handeye.types.camera import Camera
 from handeye.types.mounting import Mounting
-from handeye.types.pose import Pose
+from handeye.types.pose import Pose, inverses
 from handeye.types.recording import Recording, check_points
 from handeye.types.target import Target
 from handeye.types.view import View
@@ -189,7 +189,8 @@ class Measurements:
     @cached_property
     def motions(self) -> FloatArray:
         """(K, 4, 4) A of the chain of each view."""
-        return np.array([self.mounting.chain(v.T_base_flange).matrix for v in self.views]).reshape(-1, 4, 4)
+        poses = np.array([view.T_base_flange.matrix for view in self.views]).reshape(-1, 4, 4)
+        return poses if self.mounting is Mounting.EYE_TO_HAND else inverses(poses)
 
     @cached_property
     def joints(self) -> FloatArray:

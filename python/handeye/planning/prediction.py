@@ -164,11 +164,11 @@ class Prediction:
         before = self._belief.covariance[:6, :6]
         return foretold(before, self.estimate.hand_eye_covariance, after, comes_again=not known)
 
-    def _arm(self, joints: FloatArray | None) -> tuple[FloatArray, FloatArray] | None:
+    def _arm(self, joints: FloatArray | None) -> FloatArray | None:
         arm = self.estimate.arm
         if arm is None or joints is None:
             return None
-        return arm.candidates(self.estimate.mounting, joints, self.estimate.station_noise.joint_rad)
+        return arm.columns(self.estimate.mounting, joints, self.estimate.station_noise.joint_rad)
 
 
 def gains(

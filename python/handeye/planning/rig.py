@@ -259,8 +259,7 @@ def _joint(
             margin_px=sight.margin_px,
             fewest=sight.fewest or one.target.point_count,
         )
-        nothing = np.zeros((len(motions), 6, 1))
-        own = predictor.informations(motions, arm=(nothing, columns))
+        own = predictor.informations(motions, arm=columns)
         rows = [*_rows(estimate, (camera, target)), *range(count, count + shared)]
         if total is None:
             total = np.zeros((len(motions), count + shared, count + shared))

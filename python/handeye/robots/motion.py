@@ -83,9 +83,7 @@ class ArmKinematics:
         Jacobian of the flange. Eye to hand: A is the pose itself, ``A(q + dq) = exp(J dq) A(q)`` with that of
         the base.
         """
-        if mounting is Mounting.EYE_IN_HAND:
-            return -_seen_from(self.T_tip_flange.inverse(), self.arm.jacobian(joints, "flange"))
-        return _seen_from(self.T_base_root, self.arm.jacobian(joints, "base"))
+        return self.displacements(mounting, joints, self.joint_twists)
 
     @property
     def link_twists(self) -> FloatArray:
@@ -117,12 +115,25 @@ class ArmKinematics:
 
     def link_jacobians(self, mounting: Mounting, joints: FloatArray) -> FloatArray:
         """(K, 6, m) L at joint positions (K, n): truly ``A = exp(L l) A_reported``, l metres and radians."""
-        twists = self.link_twists
+        return self.displacements(mounting, joints, self.link_twists)
+
+    @cached_property
+    def joint_twists(self) -> FloatArray:
+        """(n, 6, n) as `link_twists`, of displacements that are the motions of the joints."""
+        twists = np.zeros((len(self.arm), 6, len(self.arm)))
+        for i, joint in enumerate(self.arm.joints):
+            first = 0 if joint.sliding else 3
+            twists[i, first : first + 3, i] = np.array(joint.axis) / np.linalg.norm(joint.axis)
+        twists.flags.writeable = False
+        return twists
+
+    def displacements(self, mounting: Mounting, joints: FloatArray, twists: FloatArray) -> FloatArray:
+        """(K, 6, m) as `link_jacobians`, of other displacements (n, 6, m), each of one joint."""
         which = np.abs(twists).sum(axis=1).argmax(axis=0)
         of_joint = twists[which, :, np.arange(twists.shape[2])]
         if mounting is Mounting.EYE_IN_HAND:
-            moved = self.arm.displacements(joints, which.tolist(), of_joint, "flange")
-            return -_seen_from(self.T_tip_flange.inverse(), moved)
+            moved = self.arm.displacements(joints, which.tolist(), -of_joint, "flange")
+            return _seen_from(self.T_tip_flange.inverse(), moved)
         return _seen_from(self.T_base_root, self.arm.displacements(joints, which.tolist(), of_joint, "base"))
 
 

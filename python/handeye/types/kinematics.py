@@ -43,6 +43,15 @@ class Kinematics(Protocol):
         """(K, 6, m) L of the chain at joint positions (K, n): truly ``A = exp(L l) A_reported``."""
         ...
 
+    @property
+    def joint_twists(self) -> FloatArray:
+        """(n, 6, n) as `link_twists`, of displacements that are the motions of the joints."""
+        ...
+
+    def displacements(self, mounting: Mounting, joints: FloatArray, twists: FloatArray) -> FloatArray:
+        """(K, 6, m) as `link_jacobians`, of other displacements (n, 6, m), each of one joint."""
+        ...
+
     def reach(self, T_base_flange: FloatArray, near: FloatArray) -> tuple[FloatArray, BoolArray]:
         """(N, n) joint positions at poses (N, 4, 4) as reported, near (N, n), and which (N,) are reached."""
         ...

@@ -91,55 +91,38 @@ pub struct CandidateJoints {
     pub noise_root: Option<DMatrix<f64>>,
 }
 
-/// [`CandidateJoints`] of many candidates, one after another: 6 x n matrices, row by row.
+/// [`CandidateJoints`] of many candidates.
 #[derive(Clone, Copy, Debug)]
 pub struct ArmColumns<'a> {
-    /// Columns of the arm's constant errors.
-    pub constants: &'a [f64],
-    /// Square roots of the covariance of the noise of the joints; nothing where it has none.
-    pub noise: &'a [f64],
-    /// Columns of the constants, and of the noise, of each candidate.
+    /// Matrices of six rows, one after another, row by row: columns of the arm's constant errors, then those of a square
+    /// root of the covariance of the noise of the joints.
+    pub entries: &'a [f64],
+    /// Columns of the constants, and of the noise.
     pub counts: (usize, usize),
 }
 
 impl ArmColumns<'_> {
     /// Of candidate `i`.
     pub fn of(&self, i: usize) -> CandidateJoints {
-        let matrix = |entries: &[f64], count: usize| {
-            DMatrix::from_row_slice(6, count, &entries[6 * count * i..6 * count * (i + 1)])
-        };
         let (constants, noise) = self.counts;
+        let both = DMatrix::from_row_slice(6, constants + noise, self.part(i, 1).entries);
         CandidateJoints {
-            constants: matrix(self.constants, constants),
-            noise_root: (noise > 0).then(|| matrix(self.noise, noise)),
+            constants: both.columns(0, constants).into_owned(),
+            noise_root: (noise > 0).then(|| both.columns(constants, noise).into_owned()),
         }
     }
 
     /// Of `count` candidates from `first` on.
     pub(super) fn part(&self, first: usize, count: usize) -> Self {
-        let part = |entries, columns: usize| -> &[f64] {
-            let entries: &[f64] = entries;
-            &entries[6 * columns * first..6 * columns * (first + count)]
-        };
-        Self {
-            constants: part(self.constants, self.counts.0),
-            noise: part(self.noise, self.counts.1),
-            counts: self.counts,
-        }
-    }
-
-    /// Whether these are the columns of so many candidates with so many constants.
-    fn fits(&self, candidates: usize, constants: usize) -> bool {
-        let (of_constants, of_noise) = self.counts;
-        of_constants == constants
-            && self.constants.len() == 6 * constants * candidates
-            && self.noise.len() == 6 * of_noise * candidates
+        let each = 6 * (self.counts.0 + self.counts.1);
+        Self { entries: &self.entries[each * first..each * (first + count)], counts: self.counts }
     }
 
     /// # Errors
     /// [`Error::InvalidInput`] if they are not.
     pub(super) fn check(&self, candidates: usize, constants: usize) -> Result<(), Error> {
-        if self.fits(candidates, constants) {
+        let (of_constants, of_noise) = self.counts;
+        if of_constants == constants && self.entries.len() == 6 * (constants + of_noise) * candidates {
             return Ok(());
         }
         Err(Error::invalid(format!(

@@ -2,7 +2,7 @@
 
 #![expect(clippy::inline_always, reason = "the kernel exists only inside the entry point of its unit")]
 
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 
 use super::chain::{Chain, JointKind, MAX_JOINTS};
 use crate::error::Error;
@@ -120,15 +120,29 @@ impl Chain {
         if m == 0 {
             return Ok(());
         }
+        // Along the frames whose z is an axis, what shifts and what turns.
+        let turned = |(joint, twist): &(usize, Vector6<f64>)| {
+            // Its own frame to the one whose z is its axis.
+            let turn = self.turns[*joint].rotation;
+            let (rho, phi) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
+            (*joint, turn * rho, (phi != Vector3::zeros()).then(|| turn * phi))
+        };
+        let ways: Vec<_> = ways.iter().map(turned).collect();
         for (q, out) in checked(q.chunks_exact(self.len()).zip(out.chunks_exact_mut(6 * m))) {
-            let (flange, places) = self.places(q);
-            let back = match frame {
-                Frame::Base => Se3::identity(),
-                Frame::Flange => flange.inverse(),
-            };
-            for (w, (joint, twist)) in ways.iter().enumerate() {
-                let column = (back * places[*joint]).adjoint() * twist;
-                for (row, entry) in column.iter().enumerate() {
+            let (flange, mut places) = self.places(q);
+            if frame == Frame::Flange {
+                let back = flange.inverse();
+                places[..self.len()].iter_mut().for_each(|place| *place = back * *place);
+            }
+            for (w, (joint, rho, phi)) in ways.iter().enumerate() {
+                let place = &places[*joint];
+                let (mut rho, mut phi) = (place.rotation * rho, *phi);
+                if let Some(phi) = &mut phi {
+                    *phi = place.rotation * *phi;
+                    rho += place.translation.cross(phi);
+                }
+                let phi = phi.unwrap_or_default();
+                for (row, entry) in rho.iter().chain(&phi).enumerate() {
                     out[row * m + w] = *entry;
                 }
             }

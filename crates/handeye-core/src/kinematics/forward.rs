@@ -55,12 +55,12 @@ impl Chain {
         (flange, columns)
     }
 
-    /// `T_base_flange`, and for each joint what carries twists of its own frame, before it moves, to the base.
+    /// `T_base_flange`, and each joint before it moves, in the frame whose z is its axis.
     pub(super) fn places(&self, q: &[f64]) -> (Se3, [Se3; MAX_JOINTS]) {
         let mut places = [Se3::identity(); MAX_JOINTS];
         let mut t = self.links[0];
         for (i, joint) in self.joints().iter().enumerate() {
-            places[i] = t * self.turns[i];
+            places[i] = t;
             move_joint(&mut t, joint.kind, q[i]);
             t = t * self.links[i + 1];
         }

@@ -181,29 +181,23 @@ impl<'a> Scorer<'a> {
     fn attach(&self, arm: &ArmColumns<'_>, block: &mut Block) {
         let to_camera = self.model.x.adjoint();
         let fewest = self.model.visibility.fewest.max(1) as f64;
-        let (constants, noise) = arm.counts;
-        let mut moved = vec![0.0; constants.max(noise)];
-        for (first, entries, count) in [(0, arm.constants, constants), (constants, arm.noise, noise)] {
-            if count == 0 {
+        let count = arm.counts.0 + arm.counts.1;
+        let mut moved = vec![0.0; count];
+        for (lane, entries) in arm.entries.chunks_exact((6 * count).max(1)).enumerate() {
+            if block.seen[lane] < fewest {
                 continue;
             }
-            for (lane, entries) in entries.chunks_exact(6 * count).enumerate() {
-                if block.seen[lane] < fewest {
-                    continue;
+            for i in 0..6 {
+                moved.fill(0.0);
+                // Of a turn nothing comes of a shift.
+                for (k, row) in entries.chunks_exact(count).enumerate().skip(i / 3 * 3) {
+                    let factor = to_camera[(i, k)];
+                    for (to, from) in moved.iter_mut().zip(row) {
+                        *to += factor * from;
+                    }
                 }
-                for i in 0..6 {
-                    let moved = &mut moved[..count];
-                    moved.fill(0.0);
-                    for (k, row) in entries.chunks_exact(count).enumerate() {
-                        let factor = to_camera[(i, k)];
-                        for (to, from) in moved.iter_mut().zip(row) {
-                            *to += factor * from;
-                        }
-                    }
-                    let rows = block.arm[6 * first..].iter_mut().skip(i).step_by(6);
-                    for (row, moved) in rows.zip(moved.iter()) {
-                        row[lane] = *moved;
-                    }
+                for (row, moved) in block.arm.iter_mut().skip(i).step_by(6).zip(&moved) {
+                    row[lane] = *moved;
                 }
             }
         }

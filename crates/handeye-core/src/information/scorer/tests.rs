@@ -159,9 +159,10 @@ fn errors_of_the_arm_are_taken_in_lanes_too() {
         scene.robot =
             if noise == 5 { RobotError::default() } else { RobotError::on_right(robot_root(random)) };
         let count = scene.motions.len();
-        let constants: Vec<f64> = (0..count * 6 * 9).map(|_| random.uniform(-1.0, 1.0)).collect();
-        let roots: Vec<f64> = (0..count * 6 * noise).map(|_| random.uniform(-5e-4, 5e-4)).collect();
-        let arm = ArmColumns { constants: &constants, noise: &roots, counts: (9, noise) };
+        let largest = |i| if i % (9 + noise) < 9 { 1.0 } else { 5e-4 };
+        let entries: Vec<f64> =
+            (0..count * 6 * (9 + noise)).map(|i| largest(i) * random.uniform(-1.0, 1.0)).collect();
+        let arm = ArmColumns { entries: &entries, counts: (9, noise) };
         let model = scene.model();
         for criterion in criteria() {
             let criterion = criterion.as_ref();
