@@ -60,3 +60,16 @@ def test_every_vector_unit_and_thread_count_agrees(lens: str) -> None:
     np.testing.assert_array_equal(np.isnan(gains(lens, at)), np.isnan(expected))
     assert np.isnan(expected).any()
     assert np.isfinite(expected).sum() > 500
+
+
+@pytest.mark.parametrize("shape", [(50, 6), (50, 5, 3), (49, 6, 3)])
+def test_an_arm_of_other_candidates_is_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(InputError, match="the arm of"):
+        gains("pinhole", motions(50), arm=np.zeros(shape))
+
+
+def test_an_arm_that_moves_nothing_changes_no_gain() -> None:
+    at = motions(50)
+    np.testing.assert_allclose(
+        gains("pinhole", at, arm=np.zeros((50, 6, 3))), gains("pinhole", at), rtol=1e-10
+    )
