@@ -128,7 +128,7 @@ def test_a_person_is_told_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixtu
         ("chessboard --output b.pdf --paper a99", ExitCode.UNUSABLE_INPUT),
         ("chessboard --output b.pdf --rows 0", ExitCode.UNUSABLE_INPUT),
         ("chessboard --output b.pdf --rows 0 --pitch-mm -1", ExitCode.UNUSABLE_INPUT),
-        ("chessboard --output b.pdf --pitch-mm nan", ExitCode.UNUSABLE_INPUT),
+        ("chessboard --output b.pdf --pitch-mm nan", ExitCode.USAGE),
         ("chessboard --output b.pdf --tag-mm 3", ExitCode.USAGE),
         ("chessboard --output b.pdf --border-bits 1", ExitCode.USAGE),
         ("aruco_grid --output b.pdf --ids 1,x", ExitCode.USAGE),

@@ -80,6 +80,12 @@ def test_a_dry_run_moves_and_writes_nothing(handeye: Handeye, tmp_path: Path) ->
         (("--session", "x", "--accuracy-mm", "-1"), 3),
         (("--dry-run", "--driver", "manual", "--images", "opencv:0"), 3),
         (("--session", "nowhere", "--resume"), 3),
+        (("--session", "nowhere", "--resume", "--max-views", "9"), 2),
+        (("--session", "nowhere", "--resume", "--speed-deg-s", "9"), 2),
+        (("--session", "x", "--touch-mm", "0.5", "--tool-mm", "0", "0", "1e300"), 2),
+        (("--session", "x", "--points-only", "inf"), 2),
+        (("--session", "x", "--blur-px", "-1"), 2),
+        (("--session", "x", "--accuracy-mm", "nan"), 2),
         (("--session", "missing/folder"), 7),
     ],
 )

@@ -1,6 +1,7 @@
 """How the answer came about."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -61,6 +62,15 @@ def test_curve_of_many_views_has_few_points() -> None:
 def test_too_few_views_have_no_curve() -> None:
     measurements = Measurements.of_recording(opened_cell(count=5).recording).select([0, 1])
     assert curve(measurements, ModelName.AUTO) == []
+
+
+@pytest.mark.parametrize("asked", [{"touch_mm": 0.5}, {"camera_known": False}])
+def test_what_is_asked_for_in_other_terms_is_not_judged_by_these(
+    tmp_path: Path, asked: dict[str, Any]
+) -> None:
+    settings = {"configuration": Configuration("epson_c4l", **asked).to_dict()}
+    create_session(tmp_path / "s", opened_cell().recording.with_views(()), settings).close()
+    assert request(tmp_path / "s", Within(translation_mm=0.1, rotation_deg=0.01)) is None
 
 
 def test_session_tells_request_and_failures(session: Path) -> None:

@@ -1,7 +1,13 @@
 """The commands and where they live; a command's module is imported when it runs."""
 
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
+from typing import cast
+
 from cyclopts import App, Parameter
 
+# No length, angle, time or number of pixels is larger.
+LARGEST = 1e12
 # Name, where it is, and the line that lists it; its own help is its docstring.
 COMMANDS = (
     ("run", "handeye.cli.run:run", "Drive the arm from view to view until the answer is good enough."),
@@ -35,6 +41,21 @@ def version() -> str:
     return f"handeye {installed('handeye')}"
 
 
+def _check_numbers(_: object, value: object) -> None:
+    """Refuse numbers that no quantity has, in options of numbers and in groups of options."""
+    if isinstance(value, tuple | list):
+        for one in cast("Sequence[object]", value):
+            _check_numbers(_, one)
+    elif is_dataclass(value):
+        for field in fields(value):
+            try:
+                _check_numbers(_, getattr(value, field.name))
+            except ValueError as error:
+                raise ValueError(f"--{field.name.replace('_', '-')}: {error}") from error
+    elif isinstance(value, float) and not abs(value) <= LARGEST:
+        raise ValueError(f"{value:g}, expected a number of at most {LARGEST:g} either way")
+
+
 def make_app(named: str = "") -> App:
     """Return the command line as a whole; the command that is named explains itself."""
     app = App(
@@ -47,7 +68,7 @@ def make_app(named: str = "") -> App:
         "7 cannot write, 8 robot or camera failed, 9 something has moved or is not as stated, "
         "130 interrupted.",
         version=version,
-        default_parameter=Parameter(negative=()),
+        default_parameter=Parameter(negative=(), validator=_check_numbers),
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )

@@ -1,7 +1,9 @@
 """`handeye run`: drive the arm from view to view until the accuracy asked for is reached."""
 
+import inspect
 import sys
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -65,7 +67,7 @@ def run(
     seed: Seed = 0,
     model: ModelName = ModelName.AUTO,
     policy: str = "next_best_view",
-    refine: bool = True,
+    refine: Annotated[bool, Parameter(negative="--no-refine")] = True,
     resume: bool = False,
     anyway: bool = False,
     dry_run: bool = False,
@@ -136,10 +138,12 @@ def run(
     confirm
         Ask before every motion; the default on a real arm.
     """
+    given = locals().copy()
     check_touch(touch_mm)
     if resume:
         if session is None:
             raise UsageError("--resume needs --session", hint="give the folder of the session to go on with")
+        _check_resumed(given)
         return _resumed(session, confirm, page, as_json=common.json)
     replays = driver.partition(":")[0] == REPLAY
     if replays and (camera, target, mounting) != (None, None, None):
@@ -260,6 +264,29 @@ def _resumed(session: Path, confirm: bool | None, page: Page, *, as_json: bool) 
             front.person.tell(f"warning: {store.notice}")
         end = _driven(loop, store, prepared, front)
     return run_answer(session, configuration, prepared, end)
+
+
+def _check_resumed(given: Mapping[str, object]) -> None:
+    """Refuse options that a session that goes on has from its beginning."""
+    usual = inspect.signature(run).parameters
+    for name in given.keys() - {"session", "resume", "confirm", "page", "common"}:
+        if given[name] != usual[name].default:
+            raise UsageError(
+                f"--resume has everything from the session, and {_named(name, given[name])} was given too",
+                hint="leave it out, or begin a new session; the page (--ui) asks a session for more",
+            )
+
+
+def _named(name: str, value: object) -> str:
+    """Return an option as it is written, or the first of a group that is stated."""
+    if not is_dataclass(value):
+        return "--" + name.replace("_", "-")
+    usual = type(value)()
+    return next(
+        "--" + field.name.replace("_", "-")
+        for field in fields(value)
+        if getattr(value, field.name) != getattr(usual, field.name)
+    )
 
 
 def _check(configuration: Configuration, *, given: bool, dry_run: bool) -> None:

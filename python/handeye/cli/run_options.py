@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
 from handeye.cli.failures import UsageError
 from handeye.datasets import RigDescription, read_rig_description
@@ -13,6 +13,8 @@ from handeye.session.drivers import MANUAL
 from handeye.session.faults import FaultRates
 from handeye.session.settings import Collisions, RigSettings, Simulation
 from handeye.session.simulated import usual_errors
+
+NotNegative = Annotated[float, Parameter(validator=validators.Number(gte=0))]
 
 
 @Parameter(name="*", group="Limits of motion and views")
@@ -137,15 +139,15 @@ class Rig:
 class Simulated:
     """What is wrong in the simulated cell."""
 
-    arm_errors: float = 1.0
+    arm_errors: NotNegative = 1.0
     """Factor on the arm's usual errors; 0 is an exact arm."""
-    blur_px: float = 0.6
+    blur_px: NotNegative = 0.6
     """Blur of the pictures."""
-    pixel_noise: float = 2.0
+    pixel_noise: NotNegative = 2.0
     """Noise of the pictures, in grey values."""
-    points_only: float | None = None
+    points_only: NotNegative | None = None
     """Project points with so much noise (px) instead of rendering and detecting: faster."""
-    faults: float = 0.0
+    faults: NotNegative = 0.0
     """Share of attempts that each kind of fault of robot and camera befalls."""
 
     def simulation(self) -> Simulation:

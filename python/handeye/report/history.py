@@ -93,11 +93,16 @@ def attempts(folder: Path) -> list[Attempt]:
 
 
 def request(folder: Path, within: Within) -> Request | None:
-    """Return what a session was asked for; None where the folder is no session or nothing was asked."""
+    """Return what a session was asked for; None where the folder is no session or nothing was asked.
+
+    A touch error, or a lens, is asked for in other terms than these radii.
+    """
     if not is_session(folder):
         return None
     asked = Configuration.from_dict(read_settings(folder).asked.get("configuration"))
     if asked.accuracy_mm is None or asked.accuracy_deg is None:
+        return None
+    if asked.touch_mm is not None or not asked.camera_known:
         return None
     return Request(
         translation_mm=asked.accuracy_mm,

@@ -117,9 +117,13 @@ class ArmKinematics:
         """(K, 6, m) L at joint positions (K, n): truly ``A = exp(L l) A_reported``, l metres and radians."""
         return self.displacements(mounting, joints, self.link_twists)
 
-    @cached_property
+    @property
     def joint_twists(self) -> FloatArray:
         """(n, 6, n) as `link_twists`, of displacements that are the motions of the joints."""
+        return self._joint_twists
+
+    @cached_property
+    def _joint_twists(self) -> FloatArray:
         twists = np.zeros((len(self.arm), 6, len(self.arm)))
         for i, joint in enumerate(self.arm.joints):
             first = 0 if joint.sliding else 3

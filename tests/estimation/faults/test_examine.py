@@ -54,6 +54,19 @@ def test_a_mistake_of_all_views_is_refused(mistake: Mistake, number: int) -> Non
     assert caught.value.hint
 
 
+@pytest.mark.parametrize("off_m", [1.0, 48.0, 100.0])
+@pytest.mark.parametrize("number", NUMBERS)
+def test_a_pose_whose_decimal_point_was_lost_is_left_out_however_far_off_it_is(
+    number: int, off_m: float
+) -> None:
+    recording = made_up(number, 3)
+    views = list(recording.views)
+    far = Pose.exp([off_m, 0, 0, 0, 0, 0]) @ views[4].T_base_flange
+    views[4] = replace(views[4], T_base_flange=far)
+    (finding,) = found(recording.with_views(views))
+    assert (finding.code, finding.evidence["views"]) == ("gross_pose", [views[4].name])
+
+
 def test_where_joints_tell_the_poses_no_notation_is_blamed() -> None:
     recording = made_up(0, 3)
     turned = [

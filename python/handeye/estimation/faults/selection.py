@@ -20,8 +20,9 @@ from handeye.types.arrays import FloatArray, IndexArray
 
 # Probability that a view is mistaken, before looking.
 LOG_MISTAKE = float(np.log(1e-3))
-# Sizes of a mistake: translation, and the lever that turns it into a rotation.
-MISTAKE_SIZES_M = np.geomspace(1e-3, 1.0, 7)
+# Sizes of a mistake: translation, up to a metre or what is farther off (a decimal point lost), and the lever
+# that turns it into a rotation.
+SMALLEST_MISTAKE_M, LARGEST_MISTAKE_M, MISTAKE_SIZES = 1e-3, 1.0, 7
 MISTAKE_LEVERS_M = np.array([0.1, 0.4, 1.6])
 LARGEST_MISTAKE_RAD = 1.5
 # The error of an arm changes with its posture: here and there a pose is off by more than the others, and no
@@ -71,11 +72,13 @@ class Selection:
 def mistake_log_density(agreement: Agreement, fit: SetFit) -> FloatArray:
     """(K,) density of the twists if the robot's pose were wrong, its prior probability included."""
     deviation, covariance = agreement.at_flange(fit)
-    sizes, levers = (axis.ravel() for axis in np.meshgrid(MISTAKE_SIZES_M, MISTAKE_LEVERS_M))
-    turns = np.minimum(sizes / levers, LARGEST_MISTAKE_RAD)
-    variances = np.square(np.concatenate([np.tile(sizes, (3, 1)), np.tile(turns, (3, 1))])).T
+    farthest = np.maximum(np.linalg.norm(deviation[:, :3], axis=1), LARGEST_MISTAKE_M)
+    sizes = np.geomspace(SMALLEST_MISTAKE_M, farthest, MISTAKE_SIZES, axis=1)[:, np.newaxis]
+    turns = np.minimum(sizes / MISTAKE_LEVERS_M[:, np.newaxis], LARGEST_MISTAKE_RAD)
+    both = np.stack([np.broadcast_to(sizes, turns.shape), turns], axis=-1).reshape(len(deviation), -1, 2)
+    variances = np.square(np.repeat(both, 3, axis=2))
     log_each = _log_gaussian(deviation[:, np.newaxis], covariance[:, np.newaxis] + _diagonal(variances))
-    return LOG_MISTAKE + np.logaddexp.reduce(log_each, axis=1) - np.log(len(sizes))
+    return LOG_MISTAKE + np.logaddexp.reduce(log_each, axis=1) - np.log(log_each.shape[1])
 
 
 def member_log_density(agreement: Agreement, fit: SetFit) -> FloatArray:
