@@ -9,6 +9,7 @@ import numpy as np
 
 from handeye.cli.answer import Answer
 from handeye.cli.session_report import report_of_session
+from handeye.cli.work import touch_lines
 from handeye.errors import DegenerateError, DetectionError, DeviceError, HandeyeError, InputError, SolveError
 from handeye.estimation.lens_confidence import lens_difference_px
 from handeye.session.deciding import EndReason
@@ -120,7 +121,8 @@ def _show(console: "Console", data: Mapping[str, Any], end: End, error: Mapping[
     heading(console, name)
     pairs(console, pose_lines(calibration.results[name]), indent=2)
     console.print()
-    rows = [("views", f"{end.views} of {end.attempts} attempts"), ("collisions", data["collisions_judged"])]
+    rows = [] if calibration.touch is None else [*touch_lines(calibration.touch)]
+    rows += [("views", f"{end.views} of {end.attempts} attempts"), ("collisions", data["collisions_judged"])]
     if end.reach is not None:
         rows.append(
             (

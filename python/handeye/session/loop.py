@@ -224,7 +224,11 @@ class Session(Stepping[Situation, End]):
                 return End(why, said, None, None, len(views), len(entries), error=error)
             if estimate.determined:
                 calibration = calibrate_examined(
-                    examination, self._wish.model, kinematics=self._kinematics, height=self._wish.height
+                    examination,
+                    self._wish.model,
+                    kinematics=self._kinematics,
+                    height=self._wish.height,
+                    work=None if self._wish.touch_mm is None else self._wish.work,
                 )
                 radii = estimate.within_95
                 lens_px = None if self._learning is None else lens_within_px(estimate)

@@ -120,7 +120,7 @@ def expect(
     InputError
         A number of views below three, or no cell.
     SolveError
-        None of the cells has an answer.
+        None of the cells has an answer, or comes to so many views.
     """
     if cells < 1 or not views or min(views) < START_VIEWS:
         raise InputError(
@@ -137,10 +137,14 @@ def expect(
     levels: list[Level] = []
     for number in numbers:
         stated = [one.stated[number] for one in told if number in one.stated]
-        if stated:
-            mean_mm, mean_deg, *radii = np.mean(stated, axis=0)
-            by_mm, by_deg = _made_of_stated(told, min(number, MEASURED))
-            levels.append(Level(number, float(by_mm * mean_mm), float(by_deg * mean_deg), *map(float, radii)))
+        if not stated:
+            raise SolveError(
+                f"none of {cells} cells came to {number} views: no pose left shows the target as asked",
+                hint="allow other distances or angles, or ask for fewer views",
+            )
+        mean_mm, mean_deg, *radii = np.mean(stated, axis=0)
+        by_mm, by_deg = _made_of_stated(told, min(number, MEASURED))
+        levels.append(Level(number, float(by_mm * mean_mm), float(by_deg * mean_deg), *map(float, radii)))
     return Expectation(tuple(levels), len(told))
 
 

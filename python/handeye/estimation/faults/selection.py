@@ -73,7 +73,10 @@ def mistake_log_density(agreement: Agreement, fit: SetFit) -> FloatArray:
     """(K,) density of the twists if the robot's pose were wrong, its prior probability included."""
     deviation, covariance = agreement.at_flange(fit)
     farthest = np.maximum(np.linalg.norm(deviation[:, :3], axis=1), LARGEST_MISTAKE_M)
-    sizes = np.geomspace(SMALLEST_MISTAKE_M, farthest, MISTAKE_SIZES, axis=1)[:, np.newaxis]
+    steps: FloatArray = np.linspace(0.0, 1.0, MISTAKE_SIZES)
+    sizes: FloatArray = (
+        SMALLEST_MISTAKE_M * (farthest / SMALLEST_MISTAKE_M)[:, np.newaxis, np.newaxis] ** steps
+    )
     turns = np.minimum(sizes / MISTAKE_LEVERS_M[:, np.newaxis], LARGEST_MISTAKE_RAD)
     both = np.stack([np.broadcast_to(sizes, turns.shape), turns], axis=-1).reshape(len(deviation), -1, 2)
     variances = np.square(np.repeat(both, 3, axis=2))
