@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -77,7 +78,10 @@ def test_an_arm_without_room_for_its_tool_goes_back_the_way_it_came(tmp_path: Pa
 def test_a_run_that_is_killed_goes_on_as_if_nothing_had_been(
     finished: Path, tmp_path: Path, seed: int
 ) -> None:
-    kills = run_killed(RIG, tmp_path / "killed", np.random.default_rng(seed), 0.6, run_rig)
+    began = time.monotonic()
+    run_rig(RIG, tmp_path / "whole")
+    mean_s = (time.monotonic() - began) / 6
+    kills = run_killed(RIG, tmp_path / "killed", np.random.default_rng(seed), mean_s, run_rig)
     assert kills > 0
     assert Outcome.of(tmp_path / "killed") == Outcome.of(finished)
     assert read_rig(tmp_path / "killed").recording == read_rig(finished).recording
