@@ -112,6 +112,8 @@ MUTANTS = (
     Mutant("a session without an answer goes on", STEPPING, "self._outvoted = situation.taken", "pass", T_WRONG_FIRST),
     Mutant("until new views outvote the old", DECIDING, "2 * self.outvoted + 1", "self.outvoted + 1", T_WRONG_FIRST),
     Mutant("in doubt no accuracy is reached", "session/rig_choosing.py", "if believed is not None and not situation.doubtful and", "if believed is not None and", T_RIG),
+    Mutant("nor with one camera", DECIDING, "return self.doubtful or (", "return False and self.doubtful or (", T_LOOP),
+    Mutant("what is in doubt judges no view", CHOOSING, "believed = None if situation.doubtful else estimate", "believed = estimate", T_LOOP),
     Mutant("no notation is blamed where joints tell the poses", "estimation/faults/alternatives.py", "if not (by_joints and h in OF_NUMBERS)", "if True", "estimation/faults/test_examine.py"),
     Mutant("no board of another size", "estimation/rig_checks.py", "if not scale_is_bearable(scale, BEARABLE_ALONE):", "if False:", "estimation/test_rig.py"),
     Mutant("no camera of another lens", "estimation/rig_checks.py", "prior, BEARABLE_ALONE):", "prior, 1e9):", "estimation/test_rig.py"),

@@ -19,7 +19,7 @@ from handeye.session.attempt import Cell, Missed, Timeouts
 from handeye.session.calls import Calls
 from handeye.session.choosing import ArmChooser
 from handeye.session.configuration import Prepared, begin, prepare
-from handeye.session.deciding import EndReason, Step
+from handeye.session.deciding import EndReason, Halt, Situation, Step
 from handeye.session.entry import Failure
 from handeye.session.faults import FaultRates
 from handeye.session.loop import End, Session
@@ -331,3 +331,22 @@ def test_numbers_that_fail_once_do_not_end_a_session_of_several_cameras(
     assert left[0] < 0
     assert end.stations == RIG.most_views
     assert end.calibration is not None
+
+
+def test_in_doubt_nothing_is_reached_and_no_view_is_judged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, store = begin(prepare(configured(3, accuracy_mm=5, accuracy_deg=0.5)), tmp_path / "s")
+    assert session.run().reason is EndReason.ACCURACY_REACHED
+    situation, decide = session._situation(), session._decide  # pyright: ignore[reportPrivateUsage]
+    store.close()
+    assert isinstance(situation, Situation)
+    assert isinstance(decide(situation), Halt)
+    turned = decide(replace(situation, doubtful=True))
+    assert isinstance(turned, Step)
+    assert (turned.phase, turned.estimate) == ("start", None)
+    # Where there is no room for a turn it is planned, by what is believed of the least.
+    monkeypatch.setattr("handeye.session.choosing.starting_goal", lambda *_: None)
+    planned = decide(replace(situation, doubtful=True))
+    assert isinstance(planned, Step)
+    assert (planned.phase, planned.estimate) == ("plan", None)

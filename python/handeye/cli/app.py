@@ -41,15 +41,15 @@ def version() -> str:
     return f"handeye {installed('handeye')}"
 
 
-def _check_numbers(_: object, value: object) -> None:
+def _check_numbers(kind: object, value: object) -> None:
     """Refuse numbers that no quantity has, in options of numbers and in groups of options."""
     if isinstance(value, tuple | list):
         for one in cast("Sequence[object]", value):
-            _check_numbers(_, one)
+            _check_numbers(kind, one)
     elif is_dataclass(value):
         for field in fields(value):
             try:
-                _check_numbers(_, getattr(value, field.name))
+                _check_numbers(kind, getattr(value, field.name))
             except ValueError as error:
                 raise ValueError(f"--{field.name.replace('_', '-')}: {error}") from error
     elif isinstance(value, float) and not abs(value) <= LARGEST:

@@ -91,7 +91,7 @@ def check(
     else:
         recording = opened.recording
         kinematics = arm.kinematics(recording.views, ModelName.AUTO)
-        known = examine(Measurements.of_recording(recording)).measurements
+        known = examine(Measurements.of_recording(recording), by_joints=kinematics is not None).measurements
         estimate = make_estimator(ModelName.AUTO, kinematics)(known)
         require_determined(estimate)
         if views is None:

@@ -66,7 +66,7 @@ def corrected(
     kinematics = arm.kinematics(opened.recording.views, ModelName.AUTO)
     if kinematics is None:
         raise AssertionError  # an arm is described
-    known = examine(Measurements.of_recording(opened.recording)).measurements
+    known = examine(Measurements.of_recording(opened.recording), by_joints=True).measurements
     calibration = solve(opened.recording, kinematics=kinematics)
     correction = calibration.arm_correction
     if correction is None:

@@ -56,7 +56,9 @@ def replay(
         data = _of_poses(opened)
     else:
         kinematics = arm.kinematics(opened.recording.views, ModelName.AUTO)
-        known = examine(Measurements.of_recording(opened.recording)).measurements
+        known = examine(
+            Measurements.of_recording(opened.recording), by_joints=kinematics is not None
+        ).measurements
         with progress("Going through the views"):
             found = hindsight(Pictures(known, make_estimator(ModelName.AUTO, kinematics)))
         data = {"recording": opened.recording.name, "views": len(known), **found.to_dict()}

@@ -48,6 +48,8 @@ if TYPE_CHECKING:
 
 Corner = tuple[float, float, float]
 DEFAULT_ARM = "epson_c4l"
+# What may be asked of a session that goes on.
+KEPT_WITH_RESUME = ("session", "resume", "confirm", "page", "common")
 
 
 def run(
@@ -138,12 +140,12 @@ def run(
     confirm
         Ask before every motion; the default on a real arm.
     """
-    given = locals().copy()
+    options = locals().copy()
     check_touch(touch_mm)
     if resume:
         if session is None:
             raise UsageError("--resume needs --session", hint="give the folder of the session to go on with")
-        _check_resumed(given)
+        _check_resumed(options)
         return _resumed(session, confirm, page, as_json=common.json)
     replays = driver.partition(":")[0] == REPLAY
     if replays and (camera, target, mounting) != (None, None, None):
@@ -266,13 +268,13 @@ def _resumed(session: Path, confirm: bool | None, page: Page, *, as_json: bool) 
     return run_answer(session, configuration, prepared, end)
 
 
-def _check_resumed(given: Mapping[str, object]) -> None:
+def _check_resumed(options: Mapping[str, object]) -> None:
     """Refuse options that a session that goes on has from its beginning."""
     usual = inspect.signature(run).parameters
-    for name in given.keys() - {"session", "resume", "confirm", "page", "common"}:
-        if given[name] != usual[name].default:
+    for name, value in options.items():
+        if name not in KEPT_WITH_RESUME and value != usual[name].default:
             raise UsageError(
-                f"--resume has everything from the session, and {_named(name, given[name])} was given too",
+                f"--resume has everything from the session, and {_named(name, value)} was given too",
                 hint="leave it out, or begin a new session; the page (--ui) asks a session for more",
             )
 

@@ -125,7 +125,9 @@ def solve(
 def _page(
     page: Page, opened: Opened, model: ModelName, kinematics: ArmKinematics | None, description: str | None
 ) -> None:
-    measurements = examine(Measurements.of_recording(opened.recording)).measurements
+    measurements = examine(
+        Measurements.of_recording(opened.recording), by_joints=kinematics is not None
+    ).measurements
     estimate = make_estimator(model, kinematics)(measurements)
     known = None if kinematics is None else kinematics.arm
     serve(show_views(page, opened, measurements, estimate, arm=known, description=description))

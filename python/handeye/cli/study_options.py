@@ -75,9 +75,6 @@ class Effort(Work):
 class Trials(Effort):
     """What studies of random starts and simulated calibrations ask for besides."""
 
-    # Their protocol refuses a seed below zero by itself, as it does other numbers.
-    seed: Seed = Effort.seed
-    """Seed of everything random."""
     model: ModelName = ModelName.AUTO
     """auto: the data say how noisy robot and camera are. paper: robot and camera are taken as exact."""
     trials: Annotated[int | None, Parameter(show_default=False)] = None

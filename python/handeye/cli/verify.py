@@ -49,7 +49,9 @@ def verify(
     probing = read_touches(touches)
     opened = source.open(folder, arm.described())
     kinematics = arm.kinematics(opened.recording.views, ModelName.AUTO)
-    known = examine(Measurements.of_recording(opened.recording)).measurements
+    known = examine(
+        Measurements.of_recording(opened.recording), by_joints=kinematics is not None
+    ).measurements
     estimate = make_estimator(ModelName.AUTO, kinematics)(known)
     require_determined(estimate)
     together = make_estimator(ModelName.AUTO, kinematics, probing=probing)(known, estimate)

@@ -85,7 +85,7 @@ def check_constants(fit: CellFit) -> None:
         if not camera_is_bearable(shift, prior, BEARABLE_ALONE):
             raise SolveError(
                 f"the views contradict one another: focal length or centre of camera {name} would be off by "
-                f"{np.abs(shift[:PINHOLE_PARAMETERS]).max():.0f} px",
+                f"{np.abs(shift[np.array(prior.free) < PINHOLE_PARAMETERS]).max():.0f} px",
                 hint=advice,
             )
     for name in fit.measurements.targets:
