@@ -7,7 +7,6 @@ mod accumulate;
 mod batched;
 mod engine;
 mod marginal;
-mod measurements;
 mod model;
 mod options;
 mod pixel_parameters;

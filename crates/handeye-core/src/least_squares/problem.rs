@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use nalgebra::Vector2;
 
-use super::measurements::{Measurements, View};
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
+use crate::pose::{Measurements, View};
 use crate::se3::Se3;
 
 /// Fewest views that can determine `X` and `Y`: two relative motions with distinct rotation axes.

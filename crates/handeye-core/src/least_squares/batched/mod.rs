@@ -5,7 +5,6 @@
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
 #![expect(clippy::needless_range_loop, reason = "indices of matrices: several are read at the same place")]
 
-mod linearise;
 mod normal;
 mod step;
 #[cfg(test)]
@@ -13,18 +12,17 @@ mod tests;
 
 use nalgebra::Vector6;
 
-use self::linearise::{Linearise, LinearisedGroup, Optics};
 use self::normal::Normal;
 pub(super) use self::normal::Workspace;
 pub(crate) use self::normal::through_chain;
 use self::step::{Equations, Step, Vector12};
 use super::engine::{Engine, Proposal, judge};
-use super::measurements::{Measurements, Row};
 use super::model::Model;
 use super::options::Start;
 use super::report::{Ending, Solution};
-use crate::camera::{Camera, Lens};
-use crate::se3::{Se3, entries};
+use crate::camera::Camera;
+use crate::pose::{LinearisedGroup, Measurements, Row, linearise};
+use crate::se3::Se3;
 use crate::simd::{MAX_LANES, dispatch};
 
 /// What changes from step to step.
@@ -37,9 +35,8 @@ struct State {
 
 pub(super) struct BatchedEngine<'a> {
     model: &'a Model,
-    lens: Lens,
+    camera: &'a Camera,
     measurements: &'a Measurements,
-    optics: Optics,
     /// `1 / sigma^2` of the pixels of each group.
     information: Vec<Row>,
     current: State,
@@ -52,7 +49,7 @@ pub(super) struct BatchedEngine<'a> {
 impl<'a> BatchedEngine<'a> {
     /// At the start; the index of the first view that cannot be seen from there otherwise.
     pub fn new(
-        camera: &Camera,
+        camera: &'a Camera,
         model: &'a Model,
         measurements: &'a Measurements,
         start: &Start,
@@ -74,9 +71,8 @@ impl<'a> BatchedEngine<'a> {
         };
         let mut engine = Self {
             model,
-            lens: camera.lens,
+            camera,
             measurements,
-            optics: Optics { parameters: camera.parameters, max_squared_radius: camera.max_squared_radius() },
             information,
             current: state(),
             trial: state(),
@@ -92,25 +88,14 @@ impl<'a> BatchedEngine<'a> {
     /// Linearises every view at the trial state; the index of the first that cannot be seen otherwise.
     fn linearise(&mut self) -> Result<(), usize> {
         let trial = &mut self.trial;
-        let (x, y) = (entries(&trial.x), entries(&trial.y));
-        macro_rules! linearise {
-            ($($flag:literal),*) => {
-                dispatch(self.workspace.unit, Linearise::<$($flag),*> {
-                    x: &x,
-                    y: &y,
-                    information: &self.information,
-                    optics: &self.optics,
-                    measurements: self.measurements,
-                    out: &mut trial.linearised,
-                })
-            };
-        }
-        match self.lens {
-            Lens::Pinhole => linearise!(false, false),
-            Lens::BrownConrady4 | Lens::BrownConrady5 => linearise!(true, false),
-            Lens::BrownConrady8 | Lens::BrownConrady12 => linearise!(true, true),
-            _ => unreachable!("measurements through other lenses are not packed"),
-        }
+        linearise(
+            self.workspace.unit,
+            self.camera,
+            (&trial.x, &trial.y),
+            &self.information,
+            self.measurements,
+            &mut trial.linearised,
+        );
         let parts = self.measurements.parts;
         let mut cost = 0.0;
         for lane in 0..self.measurements.views * parts {

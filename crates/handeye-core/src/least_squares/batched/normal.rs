@@ -1,9 +1,8 @@
 //! From the quadratics of views to the normal equations of `[xi_x; xi_y]`, lanes = views.
 
-use super::linearise::LinearisedGroup;
 use super::step::Equations;
 use crate::batched_algebra::{UPPER, load, upper};
-use crate::least_squares::measurements::Row;
+use crate::pose::{LinearisedGroup, Row};
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit};
 
 /// Sums the normal equations.

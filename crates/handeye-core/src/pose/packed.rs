@@ -8,7 +8,8 @@ use crate::se3::{Se3, entries};
 use crate::simd::MAX_LANES;
 
 /// A view as it was measured.
-pub(super) struct View<'a> {
+#[derive(Clone, Copy)]
+pub(crate) struct View<'a> {
     /// As the robot reports it.
     pub motion: &'a Se3,
     /// As many as pixels, three at least.
@@ -17,12 +18,12 @@ pub(super) struct View<'a> {
 }
 
 /// One value per view of a group.
-pub(super) type Row = [f64; MAX_LANES];
+pub(crate) type Row = [f64; MAX_LANES];
 
 /// A point of each view of a group: where it is on the target and where it was seen.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Point {
+pub(crate) struct Point {
     /// On the target, metres.
     pub position: [Row; 3],
     /// In the plane at unit depth, after the lens: `(u - c_x) / f_x`, `(v - c_y) / f_y`.
@@ -31,7 +32,7 @@ pub(super) struct Point {
 
 /// As many views, or parts of views, as the widest vector has lanes.
 #[derive(Clone, Debug)]
-pub(super) struct Group {
+pub(crate) struct Group {
     /// Points of each lane; of the first for a lane without a view.
     pub counts: Row,
     /// Up to here every lane has a point; the rest repeats a lane's first.
@@ -43,7 +44,7 @@ pub(super) struct Group {
 
 /// The views of a solve in their order, by groups.
 #[derive(Clone, Debug)]
-pub(super) struct Measurements {
+pub(crate) struct Measurements {
     pub groups: Vec<Group>,
     /// Lanes that share the points of a view; they follow one another.
     pub parts: usize,
@@ -57,8 +58,7 @@ const GROUP_COST: usize = 12;
 impl Measurements {
     /// Views split into as many parts as run fastest; None for circles and fisheyes, which have no batched engine.
     pub fn new(camera: &Camera, views: &[View<'_>]) -> Option<Self> {
-        let is_circle = |feature: &Feature| feature.radius != 0.0;
-        if !camera.lens.in_lanes() || views.iter().any(|view| view.features.iter().any(is_circle)) {
+        if !Self::in_lanes(camera, views) {
             return None;
         }
         let longest = views.iter().map(|view| view.pixels.len()).max().unwrap_or(0);
@@ -67,7 +67,13 @@ impl Measurements {
         Some(Self::in_parts(camera, views, if cost(2) < cost(1) { 2 } else { 1 }))
     }
 
-    /// With every view in `parts` parts.
+    /// Whether kernels that take many points at once know lens and features.
+    pub fn in_lanes(camera: &Camera, views: &[View<'_>]) -> bool {
+        let is_corner = |feature: &Feature| feature.radius == 0.0;
+        camera.lens.in_lanes() && views.iter().all(|view| view.features.iter().all(is_corner))
+    }
+
+    /// With every view in `parts` parts, of at least a point each.
     pub fn in_parts(camera: &Camera, views: &[View<'_>], parts: usize) -> Self {
         let lanes: Vec<View<'_>> = views.iter().flat_map(|view| split(view, parts)).collect();
         let groups = lanes.chunks(MAX_LANES).map(|lanes| group(camera, lanes)).collect();

@@ -1,13 +1,22 @@
 //! The pose of a target in one image, by least squares on the reprojection error.
 //!
 //! Levenberg-Marquardt (Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", 1963) on the
-//! left perturbation of `T_camera_target`: six unknowns, normal equations summed point by point.
+//! left perturbation of `T_camera_target`: six unknowns, normal equations summed over the points, many at once in vector
+//! lanes where they are corners and the lens is no fisheye.
+
+mod linearise;
+mod packed;
 
 use nalgebra::{Matrix6, Vector2, Vector6};
 
+use crate::batched_algebra::upper;
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
-use crate::se3::Se3;
+use crate::se3::{Se3, entries};
+use crate::simd::{MAX_LANES, VectorUnit};
+
+pub(crate) use linearise::{LinearisedGroup, linearise};
+pub(crate) use packed::{Measurements, Row, View};
 
 /// Fewest features that fix a pose near a given one.
 pub const MIN_FEATURES: usize = 3;
@@ -48,17 +57,61 @@ struct Normal {
     cost: f64,
 }
 
-/// The normal equations; the index of a feature that is not seen otherwise.
-fn normal(camera: &Camera, features: &[Feature], pixels: &[Vector2<f64>], t: &Se3) -> Result<Normal, usize> {
-    let mut sums = Normal { information: Matrix6::zeros(), gradient: Vector6::zeros(), cost: 0.0 };
-    for (i, (feature, pixel)) in features.iter().zip(pixels).enumerate() {
-        let (predicted, d_twist) = camera.observe_with_twist_derivative(t, feature).ok_or(i)?;
-        let residual = pixel - predicted;
-        sums.information += d_twist.tr_mul(&d_twist);
-        sums.gradient += d_twist.tr_mul(&residual);
-        sums.cost += 0.5 * residual.norm_squared();
+/// A view whose pose is looked for.
+struct Seen<'a> {
+    camera: &'a Camera,
+    features: &'a [Feature],
+    pixels: &'a [Vector2<f64>],
+    /// Its points shared out over the lanes; `None` for circles, fisheyes and very few points.
+    packed: Option<(Measurements, Box<LinearisedGroup>)>,
+}
+
+impl<'a> Seen<'a> {
+    fn new(camera: &'a Camera, features: &'a [Feature], pixels: &'a [Vector2<f64>]) -> Self {
+        let view = View { motion: &Se3::identity(), features, pixels };
+        let packed = (features.len() >= MAX_LANES && Measurements::in_lanes(camera, &[view]))
+            .then(|| (Measurements::in_parts(camera, &[view], MAX_LANES), Box::new(LinearisedGroup::new())));
+        Self { camera, features, pixels, packed }
     }
-    Ok(sums)
+
+    /// The normal equations; the index of a feature that is not seen otherwise.
+    fn normal(&mut self, t: &Se3) -> Result<Normal, usize> {
+        if let Some((measurements, out)) = &mut self.packed {
+            measurements.groups[0].motions = entries(t).map(|entry| [entry; MAX_LANES]);
+            let (still, out) = (&Se3::identity(), std::slice::from_mut(&mut **out));
+            linearise(
+                VectorUnit::widest(),
+                self.camera,
+                (still, still),
+                &[[1.0; MAX_LANES]],
+                measurements,
+                out,
+            );
+            if out[0].whole.iter().all(|whole| *whole > 0.0) {
+                let total = |row: &Row| row.iter().sum::<f64>();
+                return Ok(Normal {
+                    information: Matrix6::from_fn(|i, j| {
+                        total(&out[0].information[upper(i.min(j), i.max(j))])
+                    }),
+                    gradient: -Vector6::from_fn(|i, _| total(&out[0].gradient[i])),
+                    cost: 0.5 * total(&out[0].cost),
+                });
+            }
+        }
+        self.one_by_one(t)
+    }
+
+    fn one_by_one(&self, t: &Se3) -> Result<Normal, usize> {
+        let mut sums = Normal { information: Matrix6::zeros(), gradient: Vector6::zeros(), cost: 0.0 };
+        for (i, (feature, pixel)) in self.features.iter().zip(self.pixels).enumerate() {
+            let (predicted, d_twist) = self.camera.observe_with_twist_derivative(t, feature).ok_or(i)?;
+            let residual = pixel - predicted;
+            sums.information += d_twist.tr_mul(&d_twist);
+            sums.gradient += d_twist.tr_mul(&residual);
+            sums.cost += 0.5 * residual.norm_squared();
+        }
+        Ok(sums)
+    }
 }
 
 /// Refines the pose of one target from a start near it.
@@ -75,8 +128,9 @@ pub fn refine_pose(
     start: &Se3,
 ) -> Result<PoseFit, Error> {
     check(features, pixels)?;
+    let mut seen = Seen::new(camera, features, pixels);
     let mut t = *start;
-    let mut sums = normal(camera, features, pixels, &t).map_err(|i| {
+    let mut sums = seen.normal(&t).map_err(|i| {
         Error::numerical(format!(
             "feature {i} is not in view of the camera at the starting pose of the target"
         ))
@@ -98,7 +152,7 @@ pub fn refine_pose(
             return Ok(PoseFit { t_camera_target: t, rmse_px, information: sums.information, steps });
         }
         let trial = Se3::exp(&step) * t;
-        match normal(camera, features, pixels, &trial) {
+        match seen.normal(&trial) {
             Ok(lower) if lower.cost < sums.cost => {
                 (t, sums) = (trial, lower);
                 damping = (damping * 0.1).max(1e-12);
@@ -130,6 +184,10 @@ fn check(features: &[Feature], pixels: &[Vector2<f64>]) -> Result<(), Error> {
 fn determined(information: &Matrix6<f64>) -> Result<(), Error> {
     let scale = information.diagonal().map(|d| 1.0 / d.sqrt());
     let unit = Matrix6::from_fn(|i, j| information[(i, j)] * scale[i] * scale[j]);
+    // Eigenvalues of a sum of 6 have a product of the other five of at most (6 / 5)^5: the least of them is larger.
+    if unit.cholesky().is_some_and(|factor| factor.determinant() > 1.2_f64.powi(5) * MIN_EIGENVALUE) {
+        return Ok(());
+    }
     if unit.iter().all(|x| x.is_finite()) && unit.symmetric_eigenvalues().min() > MIN_EIGENVALUE {
         return Ok(());
     }

@@ -1,15 +1,16 @@
 //! Residuals and their derivatives: the 6 x 6 information and gradient of each view, lanes = views.
 
 use crate::batched_algebra::{Sums, UPPER, load, store, upper};
-use crate::camera::{DistortedPoint, MAX_PARAMETERS, MIN_DEPTH_M, distort, projection_row, restore_signs};
-use crate::least_squares::measurements::{Group, Measurements, Point, Row};
-use crate::se3::{left_product, right_product};
-use crate::simd::{Kernel, MAX_LANES, Simd, Vector};
+use crate::camera::{Camera, DistortedPoint, Lens, MIN_DEPTH_M, distort, projection_row, restore_signs};
+use crate::se3::{Se3, entries, left_product, right_product};
+use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
+
+use super::packed::{Group, Measurements, Point, Row};
 
 /// A group of views linearised at one state.
 #[derive(Clone)]
 #[repr(C, align(64))]
-pub(super) struct LinearisedGroup {
+pub(crate) struct LinearisedGroup {
     /// `X` and the robot's motion.
     pub before_y: [Row; 12],
     /// `M` and `G' r / sigma^2`.
@@ -34,24 +35,40 @@ impl LinearisedGroup {
     }
 }
 
-/// Camera parameters for the kernels.
-pub(super) struct Optics {
-    pub parameters: [f64; MAX_PARAMETERS],
-    pub max_squared_radius: f64,
+/// Linearises packed views at a state: `T_camera_target = X A Y` with the motions `A` of each lane.
+///
+/// `information` is `1 / sigma^2` of each group's pixels.
+pub(crate) fn linearise(
+    unit: VectorUnit,
+    camera: &Camera,
+    (x, y): (&Se3, &Se3),
+    information: &[Row],
+    measurements: &Measurements,
+    out: &mut [LinearisedGroup],
+) {
+    let (x, y) = (&entries(x), &entries(y));
+    macro_rules! linearise {
+        ($($flag:literal),*) => {
+            dispatch(unit, Linearise::<$($flag),*> { x, y, information, camera, measurements, out })
+        };
+    }
+    match camera.lens {
+        Lens::Pinhole => linearise!(false, false),
+        Lens::BrownConrady4 | Lens::BrownConrady5 => linearise!(true, false),
+        Lens::BrownConrady8 | Lens::BrownConrady12 => linearise!(true, true),
+        _ => unreachable!("measurements through other lenses are not packed"),
+    }
 }
 
-/// Linearises all views at a state.
-///
 /// `DISTORTED` and `FULLY` say whether the lens distorts and whether it does so with all of Brown's and Conrady's
 /// terms.
-pub(super) struct Linearise<'a, const DISTORTED: bool, const FULLY: bool> {
-    pub x: &'a [f64; 12],
-    pub y: &'a [f64; 12],
-    /// `1 / sigma^2` of each group's pixels.
-    pub information: &'a [Row],
-    pub optics: &'a Optics,
-    pub measurements: &'a Measurements,
-    pub out: &'a mut [LinearisedGroup],
+struct Linearise<'a, const DISTORTED: bool, const FULLY: bool> {
+    x: &'a [f64; 12],
+    y: &'a [f64; 12],
+    information: &'a [Row],
+    camera: &'a Camera,
+    measurements: &'a Measurements,
+    out: &'a mut [LinearisedGroup],
 }
 
 impl<const DISTORTED: bool, const FULLY: bool> Kernel for Linearise<'_, DISTORTED, FULLY> {
@@ -59,10 +76,10 @@ impl<const DISTORTED: bool, const FULLY: bool> Kernel for Linearise<'_, DISTORTE
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let p = &self.optics.parameters;
+        let p = &self.camera.parameters;
         let aspect = p[1] / p[0];
         let squared_focal = simd.splat(p[0] * p[0]);
-        let how = How::<DISTORTED, FULLY> { optics: self.optics };
+        let how = How::<DISTORTED, FULLY> { camera: self.camera };
         for (g, group) in self.measurements.groups.iter().enumerate() {
             let out = &mut self.out[g];
             for at in (0..MAX_LANES).step_by(S::LANES) {
@@ -131,7 +148,7 @@ impl<V: Vector> View<V> {
 
 /// How points are looked at.
 struct How<'a, const DISTORTED: bool, const FULLY: bool> {
-    optics: &'a Optics,
+    camera: &'a Camera,
 }
 
 impl<const DISTORTED: bool, const FULLY: bool> How<'_, DISTORTED, FULLY> {
@@ -160,11 +177,11 @@ impl<const DISTORTED: bool, const FULLY: bool> How<'_, DISTORTED, FULLY> {
         let (mut x, mut y) = (moved[0] * w, moved[1] * w);
         let front = moved[2].greater(simd.splat(MIN_DEPTH_M));
         let distorted: DistortedPoint<S::Vector> = if DISTORTED {
-            distort::<S, FULLY, FULLY>(simd, &self.optics.parameters, x, y)
+            distort::<S, FULLY, FULLY>(simd, &self.camera.parameters, x, y)
         } else {
             DistortedPoint::unchanged(simd, x, y)
         };
-        let in_sight = front & distorted.is_valid(simd, self.optics.max_squared_radius);
+        let in_sight = front & distorted.is_valid(simd, self.camera.max_squared_radius());
         // Rows that a lane has no point for are zero.
         let counts = simd.load(&group.counts[at..]).greater(simd.splat(i as f64));
         view.whole = if RAGGED {
