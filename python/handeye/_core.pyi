@@ -363,6 +363,16 @@ class Problem:
     @property
     def view_count(self) -> int:
         """Number of views."""
+    def through(self, lens: str, parameters: ArrayLike) -> Problem:
+        """Return the same pixels as of another camera."""
+    def refined(
+        self, views: list[int], starts: ArrayLike
+    ) -> tuple[NDArray[float64], list[float], NDArray[float64]]:
+        """Refine poses (M, 4, 4) of these views, each from its start.
+
+        Returns the poses, root mean squares in pixels, and information (M, 6, 6) at 1 px; raises as
+        `refine_pose`.
+        """
     def solve(
         self,
         x: ArrayLike,

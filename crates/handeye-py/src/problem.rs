@@ -31,6 +31,17 @@ pub struct Solution {
     inner: CoreSolution,
 }
 
+type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
+
+impl Problem {
+    fn check_views(&self, py: Python<'_>, views: &[usize]) -> PyResult<()> {
+        match views.iter().find(|k| **k >= self.inner.view_count()) {
+            Some(k) => Err(invalid(py, &format!("view {k} of {}", self.inner.view_count()))),
+            None => Ok(()),
+        }
+    }
+}
+
 #[pymethods]
 impl Problem {
     #[new]
@@ -59,6 +70,34 @@ impl Problem {
     #[getter]
     fn view_count(&self) -> usize {
         self.inner.view_count()
+    }
+
+    /// The same pixels as of another camera.
+    fn through(&self, py: Python<'_>, lens: &str, parameters: Array<'_>) -> PyResult<Self> {
+        Ok(Self { inner: self.inner.through(camera(py, lens, &parameters)?) })
+    }
+
+    /// Poses that fit some views best, each near its start; see the type stub.
+    fn refined<'py>(
+        &self,
+        py: Python<'py>,
+        views: Vec<usize>,
+        starts: Array<'py>,
+    ) -> PyResult<(Floats<'py>, Vec<f64>, Floats<'py>)> {
+        let starts = convert::transforms(py, "starts", &starts)?;
+        if starts.len() != views.len() {
+            return Err(invalid(py, &format!("{} starts for {} views", starts.len(), views.len())));
+        }
+        self.check_views(py, &views)?;
+        let starts: Vec<_> = views.into_iter().zip(starts).collect();
+        let fits = py.core(|| self.inner.refined(&starts))?.map_err(|e| to_python(py, e))?;
+        let poses: Vec<_> = fits.iter().map(|fit| fit.t_camera_target).collect();
+        let information: Vec<_> = fits.iter().map(|fit| fit.information).collect();
+        Ok((
+            convert::transforms_out(py, &poses),
+            fits.iter().map(|fit| fit.rmse_px).collect(),
+            convert::matrices_out(py, &information),
+        ))
     }
 
     /// Minimises the reprojection error; see the type stub.
@@ -95,9 +134,7 @@ impl Problem {
     ) -> PyResult<f64> {
         let (x, y) = (convert::transform(py, "x", &x)?, convert::transform(py, "y", &y)?);
         let views = views.unwrap_or_else(|| (0..self.inner.view_count()).collect());
-        if let Some(k) = views.iter().find(|k| **k >= self.inner.view_count()) {
-            return Err(invalid(py, &format!("view {k} of {}", self.inner.view_count())));
-        }
+        self.check_views(py, &views)?;
         py.core(|| {
             views
                 .iter()

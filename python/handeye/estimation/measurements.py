@@ -163,25 +163,26 @@ class Measurements:
 
         Every pose is refined from the one it had; where that fails all are found from nothing.
         """
-        mirrored = [(k, pose.mirrored[0]) for k, pose in enumerate(self.poses) if pose.mirrored is not None]
-        starts = [(k, pose.T_camera_target) for k, pose in enumerate(self.poses)] + mirrored
-        lens, points, radii = (camera.lens, camera.parameters), self.target.points, self.target.radii_m
-        views = [(points[view.point_ids], radii[view.point_ids], view.pixels) for view in self.views]
+        mirrored = [(k, pose.mirrored[0].matrix) for k, pose in enumerate(self.poses) if pose.mirrored]
+        problem = self.problem.through(camera.lens, camera.parameters)
+        views = [*range(len(self)), *(k for k, _ in mirrored)]
+        starts = np.concatenate([self.camera_poses, *(start[np.newaxis] for _, start in mirrored)])
         try:
-            fits = [_core.refine_pose(*lens, *views[k], start.matrix) for k, start in starts]
+            fits = problem.refined(views, starts)
         except HandeyeError:
             return self.through(camera)
         found = [
             ViewPose(pose, rmse_px, information, None)
-            for pose, (_, rmse_px, information) in zip(
-                Pose.of_matrices([fit[0] for fit in fits]), fits, strict=True
-            )
+            for pose, rmse_px, information in zip(Pose.of_matrices(fits[0]), *fits[1:], strict=True)
         ]
         poses = found[: len(self)]
         for (k, _), other in zip(mirrored, found[len(self) :], strict=True):
             best, worse = sorted((poses[k], other), key=lambda pose: pose.rmse_px)
             poses[k] = replace(best, mirrored=(worse.T_camera_target, worse.rmse_px))
-        return replace(self, camera=camera, poses=tuple(poses))
+        near = replace(self, camera=camera, poses=tuple(poses))
+        # Pixels are packed for the core once, whatever camera they are seen through.
+        vars(near)["problem"] = problem
+        return near
 
     def __len__(self) -> int:
         return len(self.views)

@@ -24,6 +24,7 @@ mod linearisation;
 mod mixed;
 mod nodes;
 mod pixel_field;
+mod pixel_rows;
 mod pose_measurement;
 mod posterior;
 mod products;

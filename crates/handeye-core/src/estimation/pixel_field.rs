@@ -6,14 +6,13 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
 
+use super::pixel_rows::{POLYNOMIALS, PixelRows};
 use super::products::{Accumulate, TOGETHER};
 use crate::camera::Camera;
 use crate::least_squares::{PixelColumns, PixelParameters, Problem, ViewBlock};
 use crate::se3::Se3;
-use crate::simd::{MAX_LANES, VectorUnit, dispatch};
+use crate::simd::{VectorUnit, dispatch};
 
-/// Polynomials of the second degree in two coordinates of the board.
-const POLYNOMIALS: usize = 6;
 /// What is left of a column's square below this share is rounding.
 const INDEPENDENT: f64 = 1e-6;
 /// Fewest measurements beyond all that is fitted.
@@ -41,45 +40,26 @@ pub(super) fn quadratic(
     weights: Option<&[f64]>,
 ) -> Option<(ViewBlock, SlowResiduals)> {
     let samples = problem.samples(k);
-    let free: &[usize] = parameters.map_or(&[], |p| &p.camera);
-    let fitted = 6 + free.len();
-    // Behind pose, camera and polynomials the residual and what the scale of the board does, which the pose takes up.
-    let columns = fitted + 2 * POLYNOMIALS;
-    let scale = columns + 1;
-    let features = &problem.features()[samples.clone()];
-    let (centre, half) = extent(&features.iter().map(|f| [f.position.x, f.position.y]));
-    let width = (columns + 2).next_multiple_of(MAX_LANES);
-    let mut rows = vec![0.0; 2 * samples.len() * width];
-    let points = features.iter().zip(&problem.pixels()[samples.clone()]);
-    for (n, ((feature, pixel), row)) in points.zip(rows.chunks_exact_mut(2 * width)).enumerate() {
-        let seen = camera.observe_with_derivatives(pose, feature)?;
-        let (x, y) = ((feature.position.x - centre[0]) / half[0], (feature.position.y - centre[1]) / half[1]);
-        let turned = pose.rotation * feature.position;
-        for (axis, row) in row.chunks_exact_mut(width).enumerate() {
-            for (j, entry) in row[..6].iter_mut().enumerate() {
-                *entry = seen.d_twist[(axis, j)];
-            }
-            for (entry, j) in row[6..fitted].iter_mut().zip(free) {
-                *entry = seen.d_parameters[(axis, *j)];
-            }
-            let at = fitted + axis * POLYNOMIALS;
-            row[at..at + POLYNOMIALS].copy_from_slice(&[1.0, y, y * y, x, x * y, x * x]);
-            row[columns] = pixel[axis] - seen.pixel[axis];
-            // The first three columns of a twist are d pixel / d p, and d p / d scale = R P.
-            row[scale] = (0..3).map(|i| row[i] * turned[i]).sum();
-            if let Some(weights) = weights {
-                let root = weights[n].sqrt();
-                for entry in row.iter_mut() {
-                    *entry *= root;
-                }
-            }
-        }
-    }
-    let size = (columns + 2).next_multiple_of(TOGETHER);
-    let mut gram = vec![0.0; size * width];
-    dispatch(VectorUnit::widest(), Accumulate::pairs(&rows, width, columns + 2, &mut gram));
-    let product = |i: usize, j: usize| gram[i.min(j) * width + i.max(j)];
-    let squared_px = product(columns, columns);
+    let seen = PixelRows {
+        camera,
+        pose,
+        free: parameters.map_or(&[], |p| &p.camera),
+        features: &problem.features()[samples.clone()],
+        pixels: &problem.pixels()[samples.clone()],
+        weights,
+    };
+    let (fitted, residual, width) = (seen.fitted(), seen.residual(), seen.width());
+    let scale = residual + 1;
+    let grams = seen.rows()?.map(|rows| {
+        let mut gram = vec![0.0; (scale + 1).next_multiple_of(TOGETHER) * width];
+        dispatch(VectorUnit::widest(), Accumulate::pairs(&rows, width, scale + 1, &mut gram));
+        gram
+    });
+    let product = |i: usize, j: usize| {
+        let at = i.min(j) * width + i.max(j);
+        grams[0][at] + grams[1][at]
+    };
+    let squared_px = product(residual, residual);
     if !squared_px.is_finite() {
         return None;
     }
@@ -87,19 +67,31 @@ pub(super) fn quadratic(
         (6..fitted).chain(parameters.is_some_and(|p| p.board_scale).then_some(scale)).collect();
     let block = ViewBlock {
         m: Matrix6::from_fn(&product),
-        g: Vector6::from_fn(|i, _| -product(i, columns)),
+        g: Vector6::from_fn(|i, _| -product(i, residual)),
         columns: parameters.map(|_| PixelColumns {
             mc: Matrix6xX::from_fn(own.len(), |i, j| product(i, own[j])),
             cc: DMatrix::from_fn(own.len(), own.len(), |i, j| product(own[i], own[j])),
-            gc: DVector::from_fn(own.len(), |i, _| -product(own[i], columns)),
+            gc: DVector::from_fn(own.len(), |i, _| -product(own[i], residual)),
         }),
         squared_px,
     };
+    // Each axis of the image has polynomials of its own; behind them the residual, and nothing of the board's scale,
+    // which the pose takes up.
+    let columns = fitted + 2 * POLYNOMIALS;
     if 2 * samples.len() < columns + FEWEST_LEFT {
         return Some((block, SlowResiduals::default()));
     }
-    let slow = eliminate(&mut gram, width, columns, fitted);
-    Some((block, slow))
+    let mut both = vec![0.0; (columns + 1) * (columns + 1)];
+    for (axis, gram) in grams.iter().enumerate() {
+        let place =
+            |i: usize| if i < fitted { i } else { i + axis.max(usize::from(i == residual)) * POLYNOMIALS };
+        for i in 0..=residual {
+            for j in i..=residual {
+                both[place(i) * (columns + 1) + place(j)] += gram[i * width + j];
+            }
+        }
+    }
+    Some((block, eliminate(&mut both, columns + 1, columns, fitted)))
 }
 
 /// Takes columns out of the residuals one by one; what those beyond the fitted ones take is slow.
@@ -126,19 +118,6 @@ fn eliminate(gram: &mut [f64], width: usize, columns: usize, fitted: usize) -> S
         }
     }
     slow
-}
-
-/// Middle and half size of points in both coordinates; never nothing.
-fn extent(points: &(impl Iterator<Item = [f64; 2]> + Clone)) -> ([f64; 2], [f64; 2]) {
-    let mut centre = [0.0; 2];
-    let mut half = [1.0; 2];
-    for axis in 0..2 {
-        let low = points.clone().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
-        let high = points.clone().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
-        centre[axis] = 0.5 * (low + high);
-        half[axis] = (0.5 * (high - low)).max(f64::MIN_POSITIVE);
-    }
-    (centre, half)
 }
 
 /// What the pose takes up of a smooth field is slower than what a parabola follows beyond it, and has more of its power.

@@ -1,12 +1,13 @@
 //! What was measured: robot motions, features and the pixels they were seen at.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use nalgebra::Vector2;
 
 use crate::camera::{Camera, Feature};
 use crate::error::Error;
-use crate::pose::{Measurements, View};
+use crate::pose::{Measurements, PoseFit, View, refine_pose};
 use crate::se3::Se3;
 
 /// Fewest views that can determine `X` and `Y`: two relative motions with distinct rotation axes.
@@ -20,8 +21,8 @@ pub struct Problem {
     pixels: Vec<Vector2<f64>>,
     offsets: Vec<usize>,
     motions: Vec<Se3>,
-    /// Packed for vector lanes; none for circles and fisheyes.
-    measurements: Option<Measurements>,
+    /// Packed for vector lanes once they are solved; none for circles and fisheyes.
+    measurements: OnceLock<Option<Measurements>>,
 }
 
 impl Problem {
@@ -63,9 +64,24 @@ impl Problem {
                 }
             }
         }
-        let mut problem = Self { camera, features, pixels, offsets, motions, measurements: None };
-        problem.measurements = Measurements::new(&problem.camera, &problem.views());
-        Ok(problem)
+        Ok(Self { camera, features, pixels, offsets, motions, measurements: OnceLock::new() })
+    }
+
+    /// The same pixels as of another camera.
+    pub fn through(&self, camera: Camera) -> Self {
+        Self { camera, measurements: OnceLock::new(), ..self.clone() }
+    }
+
+    /// The poses `T_camera_target` that fit some views best, each near its start.
+    ///
+    /// # Errors
+    /// As [`refine_pose`].
+    pub fn refined(&self, starts: &[(usize, Se3)]) -> Result<Vec<PoseFit>, Error> {
+        let one = |(k, start): &(usize, Se3)| {
+            let samples = self.samples(*k);
+            refine_pose(&self.camera, &self.features[samples.clone()], &self.pixels[samples], start)
+        };
+        starts.iter().map(one).collect()
     }
 
     /// All views in order.
@@ -81,7 +97,7 @@ impl Problem {
 
     /// Packed for vector lanes; None for circles and fisheyes.
     pub(super) fn measurements(&self) -> Option<&Measurements> {
-        self.measurements.as_ref()
+        self.measurements.get_or_init(|| Measurements::new(&self.camera, &self.views())).as_ref()
     }
 
     /// The camera the pixels were taken with.

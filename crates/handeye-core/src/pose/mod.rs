@@ -283,6 +283,22 @@ mod tests {
     }
 
     #[test]
+    fn sums_in_lanes_are_those_one_by_one() {
+        let (camera, features, truth) = (camera(), grid(0.0), pose(&mut Random::new(5)));
+        let features = &features[..19];
+        let mut pixels = seen(&camera, features, &truth);
+        pixels[7].x += 0.4;
+        let mut view = Seen::new(&camera, features, &pixels);
+        assert!(view.packed.is_some());
+        let (found, expected) = (view.normal(&truth).ok().unwrap(), view.one_by_one(&truth).ok().unwrap());
+        let scale = expected.information.amax();
+        assert!((found.information - expected.information).amax() < 1e-12 * scale);
+        assert!((found.gradient - expected.gradient).amax() < 1e-12 * expected.gradient.amax());
+        assert!((found.cost - expected.cost).abs() < 1e-12 * expected.cost);
+        assert!(Seen::new(&camera, &grid(0.008), &pixels).packed.is_none());
+    }
+
+    #[test]
     fn features_on_a_line_are_degenerate() {
         let (camera, truth) = (camera(), pose(&mut Random::new(1)));
         let line: Vec<Feature> = grid(0.0).into_iter().take(6).collect();
