@@ -74,6 +74,36 @@ def project(
     ([[780.0, 512.0]], [True])
     """
 
+def camera_shift(lens: str, before: ArrayLike, after: ArrayLike, size_px: tuple[int, int]) -> float:
+    """How far pixels move between two cameras of one lens, at most over a grid of rays in the image.
+
+    Infinite where no ray is seen by both.
+
+    >>> _core.camera_shift("pinhole", [1400, 1400, 640, 512], [1400, 1400, 641, 512], (1280, 1024))
+    1.0
+    """
+
+def chain_information(
+    x: ArrayLike,
+    forward: ArrayLike,
+    information: ArrayLike,
+    sigmas_px: ArrayLike,
+    *,
+    left: ArrayLike | None = None,
+    right: ArrayLike | None = None,
+) -> NDArray[float64]:
+    """Information (12, 12) of the twists of X and Y from the views alone, without any prior.
+
+    `forward` (K, 4, 4) is `X A` of each view, `information` (K, 6, 6) that of its pose at 1 px, `sigmas_px`
+    (K,) the deviation of its pixels, `left` or `right` (6, 6) the square root of the covariance of the
+    robot's error on that side of `A`.
+
+    >>> X, motions = estimate.X.matrix, measurements.motions
+    >>> pixels = [pose.information for pose in measurements.poses]
+    >>> _core.chain_information(X, X @ motions, pixels, np.full(len(pixels), 0.1)).shape
+    (12, 12)
+    """
+
 def project_jacobians(
     lens: str, parameters: ArrayLike, points_camera: ArrayLike
 ) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[bool_]]:
@@ -679,6 +709,9 @@ class Posterior:
     @property
     def levels(self) -> list[list[float]]:
         """Levels at each node (N, L), at the mode first."""
+    @property
+    def mode(self) -> list[float]:
+        """Levels at the mode (L,)."""
     @property
     def weights(self) -> list[float]:
         """Share of each node (N,)."""

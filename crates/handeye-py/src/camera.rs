@@ -18,7 +18,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(project_jacobians, module)?)?;
     module.add_function(wrap_pyfunction!(unproject, module)?)?;
     module.add_function(wrap_pyfunction!(project_features, module)?)?;
-    module.add_function(wrap_pyfunction!(refine_pose, module)?)
+    module.add_function(wrap_pyfunction!(refine_pose, module)?)?;
+    module.add_function(wrap_pyfunction!(camera_shift, module)?)
 }
 
 type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -155,6 +156,18 @@ fn refine_pose<'py>(
         fit.rmse_px,
         convert::matrix_out(py, &fit.information),
     ))
+}
+
+#[pyfunction]
+fn camera_shift(
+    py: Python<'_>,
+    lens: &str,
+    before: Array<'_>,
+    after: Array<'_>,
+    size_px: (f64, f64),
+) -> PyResult<f64> {
+    let (before, after) = (camera(py, lens, &before)?, camera(py, lens, &after)?);
+    Ok(before.largest_shift_px(&after, size_px.into()))
 }
 
 /// Vectors with NaN rows where there is none, and which there are.

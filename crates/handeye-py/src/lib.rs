@@ -19,6 +19,7 @@ mod imaging;
 mod information;
 mod kinematics;
 mod model;
+mod observability;
 mod planar_pose;
 mod planning;
 mod posterior;
@@ -40,6 +41,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     planning::register(module)?;
     problem::register(module)?;
     model::register(module)?;
+    observability::register(module)?;
     information::register(module)?;
     Ok(())
 }

@@ -72,6 +72,12 @@ impl Posterior {
         self.inner.nodes.iter().map(|node| node.levels.clone()).collect()
     }
 
+    /// Levels at the mode (L,).
+    #[getter]
+    fn mode(&self) -> Vec<f64> {
+        self.inner.nodes.first().map_or_else(Vec::new, |node| node.levels.clone())
+    }
+
     /// Share of each node (N,).
     #[getter]
     fn weights(&self) -> Vec<f64> {

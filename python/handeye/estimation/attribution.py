@@ -47,7 +47,7 @@ class Levels:
     @classmethod
     def of(cls, posterior: _core.Posterior) -> "Levels":
         """Read the levels at the mode."""
-        return cls(dict(zip(posterior.level_names, posterior.levels[0], strict=True)))
+        return cls(dict(zip(posterior.level_names, posterior.mode, strict=True)))
 
     @classmethod
     def expected_noise(cls, posterior: _core.Posterior) -> StationNoise:
@@ -120,7 +120,7 @@ def noise_of(
 
 def _at_flange(noise: StationNoise, measurements: Measurements, arm: ArmModel | None) -> tuple[float, float]:
     """Deviation per axis of the flange's translation (metres) and rotation (radians), root mean square."""
-    positions = np.array([view.T_base_flange.translation for view in measurements.views]).reshape(-1, 3)
+    positions = measurements.flange_poses[:, :3, 3]
     reach = float((positions**2).sum(axis=1).mean())
     # |w x p|^2 of a turn w of the base is on average two thirds of |w|^2 |p|^2.
     translation = noise.flange[0] ** 2 + noise.base[0] ** 2 + 2 / 3 * noise.base[1] ** 2 * reach

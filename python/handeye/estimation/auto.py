@@ -149,7 +149,7 @@ def estimate_of(
         start=posterior.origin,
         ending="converged_average" if at_rest else "iteration_limit",
         iterations=rounds,
-        candidate_sigma_px=pixels.shared * float(np.median(pixels.sigma_px)),
+        candidate_sigma_px=pixels.usual_px,
         station_noise=levels.station_noise(),
         expected_noise=Levels.expected_noise(posterior),
         free_camera=prior.free,

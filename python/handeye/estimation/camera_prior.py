@@ -86,7 +86,10 @@ def camera_prior(camera: Camera, *, fixed: bool = False) -> CameraPrior:
     # Scaled to a correlation, whose inverse is well conditioned whatever the units.
     scale = np.sqrt(np.diag(block))
     correlation = block / np.outer(scale, scale)
-    information = np.linalg.pinv(correlation, rcond=1e-12, hermitian=True) / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(correlation)
+    known = np.abs(values) > 1e-12 * np.abs(values).max(initial=0.0)
+    vectors = vectors[:, known] / scale[:, np.newaxis]
+    information = (vectors / values[known]) @ vectors.T
     return CameraPrior(
         camera,
         free,

@@ -265,7 +265,7 @@ def roughness(posterior: _core.Posterior, *, described: bool) -> float:
     Servos that miss by a degree have zeros and links that are off as much: what hides in X and Y is believed
     to be as large as what shows.
     """
-    levels = dict(zip(posterior.level_names, posterior.levels[0], strict=True))
+    levels = dict(zip(posterior.level_names, posterior.mode, strict=True))
     noise = float(
         np.hypot.reduce([levels.get(name, 0.0) for name in ("flange_rad", "base_rad", "joint_rad")])
     )
@@ -282,7 +282,7 @@ def _going_on(fit: CellFit, *, many_modes: bool = False) -> _Begin:
     """
     begin: _Begin = {"start": (np.asarray(fit.posterior.x), np.asarray(fit.posterior.y))}
     if (many_modes or len(fit.measurements.pairs) > 1) and fit.at_rest:
-        found = zip(fit.posterior.level_names, fit.posterior.levels[0], strict=True)
+        found = zip(fit.posterior.level_names, fit.posterior.mode, strict=True)
         begin["levels"] = [(name, level) for name, level in found if name in SHOWN]
     return begin
 
@@ -331,7 +331,7 @@ def _once(
         )
         for name, prior in priors.items()
     ]
-    stations = np.array([view.T_base_flange.matrix for view in measurements.stations])
+    stations = whole.flange_poses
     moving = velocities(whole)
     if touched is not None:
         stations = np.concatenate([stations, touched.poses])

@@ -18,6 +18,7 @@ from handeye.types.target import Target
 from handeye.types.view import View
 
 MIN_POINTS = 4
+_NO_IDS, _NO_PIXELS = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
 
 
 @dataclass(frozen=True)
@@ -190,8 +191,12 @@ class Measurements:
     @cached_property
     def motions(self) -> FloatArray:
         """(K, 4, 4) A of the chain of each view."""
-        poses = np.array([view.T_base_flange.matrix for view in self.views]).reshape(-1, 4, 4)
-        return poses if self.mounting is Mounting.EYE_TO_HAND else inverses(poses)
+        return self.flange_poses if self.mounting is Mounting.EYE_TO_HAND else inverses(self.flange_poses)
+
+    @cached_property
+    def flange_poses(self) -> FloatArray:
+        """(K, 4, 4) `T_base_flange` of each view, as reported."""
+        return np.array([view.T_base_flange.matrix for view in self.views]).reshape(-1, 4, 4)
 
     @cached_property
     def joints(self) -> FloatArray:
@@ -219,6 +224,11 @@ class Measurements:
         return np.array([pose.T_camera_target.matrix for pose in self.poses]).reshape(-1, 4, 4)
 
     @cached_property
+    def pose_information(self) -> FloatArray:
+        """(K, 6, 6) information of each of these poses at a pixel noise of 1 px."""
+        return np.array([pose.information for pose in self.poses]).reshape(-1, 6, 6)
+
+    @cached_property
     def point_counts(self) -> FloatArray:
         """(K,) number of points of each view."""
         return np.array([len(view) for view in self.views], dtype=float)
@@ -226,16 +236,13 @@ class Measurements:
     @cached_property
     def problem(self) -> _core.Problem:
         """The measurements inside the core."""
-        points = [self.target.points[view.point_ids] for view in self.views]
-        offsets = np.concatenate([[0], np.cumsum([len(view) for view in self.views])])
+        ids = np.concatenate([_NO_IDS, *(view.point_ids for view in self.views)])
         return _core.Problem(
             self.camera.lens,
             self.camera.parameters,
-            np.concatenate(points) if points else np.zeros((0, 3)),
-            np.concatenate([self.target.radii_m[view.point_ids] for view in self.views])
-            if points
-            else np.zeros(0),
-            np.concatenate([view.pixels for view in self.views]) if points else np.zeros((0, 2)),
-            offsets,
+            self.target.points[ids],
+            self.target.radii_m[ids],
+            np.concatenate([_NO_PIXELS, *(view.pixels for view in self.views)]),
+            np.cumsum([0, *map(len, self.views)]),
             self.motions,
         )

@@ -32,16 +32,16 @@ def chain_information(measurements: Measurements, X: Pose, noise: Noise, forward
 
     `forward` (K, 4, 4) is `X A_k` of each view.
     """
-    pixel = np.linalg.inv(np.array([pose.information for pose in measurements.poses]))
-    covariance = pixel * np.square(noise.pixel_sigma_px)[:, None, None]
-    to_y = _core.se3_adjoint(forward)
     side = side_of_chain(measurements.mounting, noise.robot_side)
-    if side is not None:
-        before = np.broadcast_to(X.adjoint(), to_y.shape) if side == "left" else to_y
-        root = before @ isotropic_root(noise.robot_translation_m, noise.robot_rotation_rad)
-        covariance = covariance + root @ root.transpose(0, 2, 1)
-    rows = np.concatenate([np.broadcast_to(np.eye(6), to_y.shape), to_y], axis=2)
-    return rows.reshape(-1, 12).T @ np.linalg.solve(covariance, rows).reshape(-1, 12)
+    root = isotropic_root(noise.robot_translation_m, noise.robot_rotation_rad)
+    return _core.chain_information(
+        X.matrix,
+        forward,
+        measurements.pose_information,
+        noise.pixel_sigma_px,
+        left=root if side == "left" else None,
+        right=root if side == "right" else None,
+    )
 
 
 def null_directions(measurements: Measurements, X: Pose, Y: Pose, noise: Noise) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from statistics import median
 
 import numpy as np
 
@@ -19,8 +21,6 @@ LEAST_PIXEL_SIGMA = 0.01
 PIXEL_PRIOR_DEGREES = 20.0
 # Beyond this, in pixels anywhere in the image, what was measured through the camera is measured again.
 LARGEST_CAMERA_SHIFT_PX = 2.0
-# Where that is looked at, in shares of the image.
-_GRID = np.stack(np.meshgrid(np.linspace(0, 1, 7), np.linspace(0, 1, 7)), axis=-1).reshape(-1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +30,11 @@ class Pixels:
     poses: _core.PoseMeasurements
     sigma_px: FloatArray
     shared: float
+
+    @cached_property
+    def usual_px(self) -> float:
+        """Deviation of the pixels of an ordinary view, with what neighbours share."""
+        return self.shared * median(self.sigma_px.tolist())
 
 
 def pixels_of(measurements: RigMeasurements, priors: Mapping[str, CameraPrior]) -> dict[Pair, Pixels]:
@@ -84,7 +89,7 @@ def camera_of_pixels(pixels: Mapping[Pair, Pixels], name: str, prior: CameraPrio
         if camera == name:
             # Beside the camera's parameters stands the board's scale, of which a plane's pixels say nothing.
             of_pixels, gradient = one.poses.camera_normal()
-            weight = 1 / (one.shared * np.median(one.sigma_px)) ** 2
+            weight = 1 / one.usual_px**2
             information += weight * of_pixels[:count, :count]
             right += weight * gradient[:count]
     scale = 1 / np.sqrt(np.diag(information))
@@ -112,18 +117,9 @@ def moved_cameras(priors: Mapping[str, CameraPrior], cameras: Mapping[str, Camer
         name: camera
         for name, camera in cameras.items()
         if camera is not priors[name].camera
-        and not _largest_shift_px(priors[name].camera, camera) < LARGEST_CAMERA_SHIFT_PX
+        and not _shift_px(priors[name].camera, camera) < LARGEST_CAMERA_SHIFT_PX
     }
 
 
-def _largest_shift_px(before: Camera, after: Camera) -> float:
-    """How far pixels move between two cameras of one lens, at most over a grid of rays in the image."""
-    fx, fy, cx, cy = before.parameters[:4]
-    rays = np.ones((len(_GRID), 3))
-    rays[:, :2] = (_GRID * (np.array(before.size_px) - 1) - [cx, cy]) / [fx, fy]
-    first, seen = before.project(rays)
-    second, still = after.project(rays)
-    both = seen & still
-    if not both.any():
-        return float("inf")
-    return float(np.linalg.norm((second - first)[both], axis=1).max())
+def _shift_px(before: Camera, after: Camera) -> float:
+    return _core.camera_shift(before.lens, before.parameters, after.parameters, before.size_px)

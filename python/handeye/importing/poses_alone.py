@@ -149,7 +149,7 @@ def _solved(pairs: PosePairs, kept: list[int], x: FloatArray, y: FloatArray) -> 
         np.asarray(posterior.covariance),
         np.asarray(posterior.information),
         posterior.degrees_of_freedom[0],
-        dict(zip(posterior.level_names, posterior.levels[0], strict=True)),
+        dict(zip(posterior.level_names, posterior.mode, strict=True)),
         distances,
         angles,
         {

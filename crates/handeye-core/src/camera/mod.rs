@@ -16,6 +16,7 @@ mod observation;
 mod pinhole;
 mod projection_row;
 mod region;
+mod shift;
 
 use nalgebra::{Matrix2x3, Matrix2x6, Vector2, Vector3};
 

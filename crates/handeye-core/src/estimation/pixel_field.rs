@@ -4,6 +4,8 @@
 //! follow beyond pose and camera, has the same power as the rest. Where neighbours err alike it has more, and so has
 //! what the pose takes up: the covariance of the pose grows by the same factor.
 
+#![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
+
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
 
 use super::pixel_rows::{POLYNOMIALS, PixelRows};
@@ -11,7 +13,7 @@ use super::products::{Accumulate, TOGETHER};
 use crate::camera::Camera;
 use crate::least_squares::{PixelColumns, PixelParameters, Problem, ViewBlock};
 use crate::se3::Se3;
-use crate::simd::{VectorUnit, dispatch};
+use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
 
 /// What is left of a column's square below this share is rounding.
 const INDEPENDENT: f64 = 1e-6;
@@ -81,43 +83,61 @@ pub(super) fn quadratic(
     if 2 * samples.len() < columns + FEWEST_LEFT {
         return Some((block, SlowResiduals::default()));
     }
-    let mut both = vec![0.0; (columns + 1) * (columns + 1)];
+    let across = (columns + 1).next_multiple_of(MAX_LANES);
+    let mut both = vec![0.0; (columns + 1) * across];
     for (axis, gram) in grams.iter().enumerate() {
         let place =
             |i: usize| if i < fitted { i } else { i + axis.max(usize::from(i == residual)) * POLYNOMIALS };
         for i in 0..=residual {
             for j in i..=residual {
-                both[place(i) * (columns + 1) + place(j)] += gram[i * width + j];
+                both[place(i) * across + place(j)] += gram[i * width + j];
             }
         }
     }
-    Some((block, eliminate(&mut both, columns + 1, columns, fitted)))
+    Some((
+        block,
+        dispatch(VectorUnit::widest(), Eliminate { gram: &mut both, width: across, columns, fitted }),
+    ))
 }
 
 /// Takes columns out of the residuals one by one; what those beyond the fitted ones take is slow.
-fn eliminate(gram: &mut [f64], width: usize, columns: usize, fitted: usize) -> SlowResiduals {
-    let mut slow = SlowResiduals::default();
-    let before: Vec<f64> = (0..columns).map(|i| gram[i * width + i]).collect();
-    for k in 0..columns {
-        let pivot = gram[k * width + k];
-        if pivot.is_nan() || pivot <= INDEPENDENT * before[k] {
-            continue;
-        }
-        let (done, rest) = gram.split_at_mut((k + 1) * width);
-        let row = &done[k * width..];
-        if k >= fitted {
-            slow.squared_px += row[columns] * row[columns] / pivot;
-            slow.freedom += 1;
-        }
-        for i in k + 1..columns {
-            let factor = row[i] / pivot;
-            let line = &mut rest[(i - k - 1) * width..(i - k) * width];
-            for j in i..=columns {
-                line[j] -= factor * row[j];
+struct Eliminate<'a> {
+    /// Products of all columns and, last, the residual; the upper triangle, in rows of whole vectors.
+    gram: &'a mut [f64],
+    width: usize,
+    columns: usize,
+    fitted: usize,
+}
+
+impl Kernel for Eliminate<'_> {
+    type Output = SlowResiduals;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> SlowResiduals {
+        let Self { gram, width, columns, fitted } = self;
+        let mut slow = SlowResiduals::default();
+        let before: Vec<f64> = (0..columns).map(|i| gram[i * width + i]).collect();
+        for k in 0..columns {
+            let (done, rest) = gram.split_at_mut((k + 1) * width);
+            let row = &done[k * width..];
+            let pivot = row[k];
+            if pivot.is_nan() || pivot <= INDEPENDENT * before[k] {
+                continue;
+            }
+            if k >= fitted {
+                slow.squared_px += row[columns] * row[columns] / pivot;
+                slow.freedom += 1;
+            }
+            for (i, line) in (k + 1..columns).zip(rest.chunks_exact_mut(width)) {
+                let factor = simd.splat(row[i] / pivot);
+                for at in (i / S::LANES * S::LANES..width).step_by(S::LANES) {
+                    let left = factor.neg_mul_add(simd.load(&row[at..]), simd.load(&line[at..]));
+                    left.store(&mut line[at..]);
+                }
             }
         }
+        slow
     }
-    slow
 }
 
 /// What the pose takes up of a smooth field is slower than what a parabola follows beyond it, and has more of its power.

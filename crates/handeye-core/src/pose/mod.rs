@@ -57,6 +57,12 @@ struct Normal {
     cost: f64,
 }
 
+/// Sum over the lanes, by halves: no addition waits for the one before.
+fn total(row: Row) -> f64 {
+    let [a, b, c, d, e, f, g, h] = row;
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
 /// A view whose pose is looked for.
 struct Seen<'a> {
     camera: &'a Camera,
@@ -88,13 +94,11 @@ impl<'a> Seen<'a> {
                 out,
             );
             if out[0].whole.iter().all(|whole| *whole > 0.0) {
-                let total = |row: &Row| row.iter().sum::<f64>();
+                let upper_triangle = out[0].information.map(total);
                 return Ok(Normal {
-                    information: Matrix6::from_fn(|i, j| {
-                        total(&out[0].information[upper(i.min(j), i.max(j))])
-                    }),
-                    gradient: -Vector6::from_fn(|i, _| total(&out[0].gradient[i])),
-                    cost: 0.5 * total(&out[0].cost),
+                    information: Matrix6::from_fn(|i, j| upper_triangle[upper(i.min(j), i.max(j))]),
+                    gradient: -Vector6::from(out[0].gradient.map(total)),
+                    cost: 0.5 * total(out[0].cost),
                 });
             }
         }
