@@ -2,7 +2,7 @@
 //!
 //! Three views at random are often degenerate (equal orientations); a plan must survive them. A weak prior keeps
 //! what they leave open near where a camera can be, and a start on each of the 24 rotations that map axes to axes
-//! finds the basin where the closed forms refuse.
+//! finds the basin where the closed forms refuse, or lead nowhere.
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
 
@@ -55,20 +55,35 @@ pub fn start_from_poses(
     if let Some((x, y)) = given {
         starts.push(Run::new(x, y, "given"));
     }
-    for method in [closed_form::Method::Shah, closed_form::Method::ParkMartin] {
+    let twists = Poses::new(motions, poses, &weights, prior);
+    twists.descend(&mut starts, FIRST_STEPS + LAST_STEPS);
+    let mut found = false;
+    for method in [closed_form::Method::ParkMartin, closed_form::Method::Shah] {
+        if found {
+            break;
+        }
         if let Ok(estimate) = closed_form::solve(method, motions, poses) {
-            starts.push(Run::new(estimate.x, estimate.y, method.name()));
+            let mut run = [Run::new(estimate.x, estimate.y, method.name())];
+            twists.descend(&mut run, FIRST_STEPS + LAST_STEPS);
+            starts.extend(run);
+            // Motions that determine an answer, and one that is off by no more than noise: there is no other.
+            found = starts.iter().any(|run| run.cost <= (6 * poses.len()) as f64);
         }
     }
-    for rotation in axis_rotations() {
-        let (x, y) = with_rotation(&rotation, motions, poses, prior);
-        starts.push(Run::new(x, y, "axes"));
+    if !found {
+        let mut axes: Vec<Run> = axis_rotations()
+            .iter()
+            .map(|rotation| {
+                let (x, y) = with_rotation(rotation, motions, poses, prior);
+                Run::new(x, y, "axes")
+            })
+            .collect();
+        twists.descend(&mut axes, FIRST_STEPS);
+        starts.append(&mut axes);
+        starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        starts.truncate(SURVIVORS);
+        twists.descend(&mut starts, LAST_STEPS);
     }
-    let poses = Poses::new(motions, poses, &weights, prior);
-    poses.descend(&mut starts, FIRST_STEPS);
-    starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    starts.truncate(SURVIVORS);
-    poses.descend(&mut starts, LAST_STEPS);
     starts
         .into_iter()
         .map(|run| ChainStart { x: run.x, y: run.y, cost: run.cost, origin: run.origin })
