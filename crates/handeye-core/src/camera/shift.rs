@@ -22,3 +22,25 @@ impl Camera {
         .unwrap_or(f64::INFINITY)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Lens;
+
+    #[test]
+    fn the_farthest_ray_counts() {
+        let camera = |fx, cx, k1| {
+            Camera::new(Lens::BrownConrady4, &[fx, 1000.0, cx, 500.0, k1, 0.0, 0.0, 0.0]).unwrap()
+        };
+        let (before, size) = (camera(1000.0, 500.0, 0.0), [1001.0, 1001.0]);
+        let shift = |other: &Camera| before.largest_shift_px(other, size);
+        assert!((shift(&camera(1000.0, 503.0, 0.0)) - 3.0).abs() < 1e-9);
+        // At the border, half the image from the middle.
+        assert!((shift(&camera(1010.0, 500.0, 0.0)) - 5.0).abs() < 1e-9);
+        let corner = 0.5_f64.sqrt();
+        assert!((shift(&camera(1000.0, 500.0, 0.01)) - 10.0 * corner.powi(3)).abs() < 1e-9);
+        // A lens that folds over so close to its axis sees only the middle of it.
+        assert!(before.largest_shift_px(&camera(1000.0, 500.0, -1e9), [1e6, 1e6]).is_infinite());
+    }
+}

@@ -59,7 +59,9 @@ impl PixelRows<'_> {
             for rows in &mut rows {
                 for (row, weight) in rows.chunks_exact_mut(self.width()).zip(weights) {
                     let root = weight.sqrt();
-                    row.iter_mut().for_each(|entry| *entry *= root);
+                    for entry in row {
+                        *entry *= root;
+                    }
                 }
             }
         }

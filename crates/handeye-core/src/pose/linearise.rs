@@ -1,7 +1,6 @@
 //! Residuals and their derivatives: the 6 x 6 information and gradient of each view, lanes = views.
 
 #![expect(clippy::inline_always, reason = "kernels exist only inside the entry point of their unit")]
-#![expect(clippy::needless_range_loop, reason = "indices of matrices: several are read at the same place")]
 
 use crate::batched_algebra::{Sums, UPPER, load, store, upper};
 use crate::camera::{Camera, DistortedPoint, Lens, MIN_DEPTH_M, distort, projection_row, restore_signs};
