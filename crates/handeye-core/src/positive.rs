@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use crate::simd::{Kernel, MAX_LANES, Simd, Vector, VectorUnit, dispatch};
 
 /// Neighbours in a row that every unit takes in whole vectors.
-type Block = [f64; MAX_LANES];
+pub(crate) type Block = [f64; MAX_LANES];
 
 /// `U' D^-1 U` of a positive definite matrix, `D` the diagonal of the upper triangular `U`.
 #[derive(Clone, Debug)]
@@ -15,7 +15,7 @@ pub(crate) struct Factor {
     size: usize,
     /// Blocks of a row.
     blocks: usize,
-    /// `U` row by row; what lies below the diagonal means nothing.
+    /// `U` row by row, what was carried along behind it; what lies below the diagonal means nothing.
     upper: Vec<Block>,
     unit: VectorUnit,
 }
@@ -30,7 +30,13 @@ impl Factor {
         for (row, column) in upper.chunks_exact_mut(blocks).zip(m.as_slice().chunks_exact(size)) {
             row.as_flattened_mut()[..size].copy_from_slice(column);
         }
-        let mut factor = Self { size, blocks, upper, unit: VectorUnit::widest() };
+        Self::carrying(size, upper)
+    }
+
+    /// By the upper triangle of a matrix, row by row, each with an entry of a right side behind it: see
+    /// [`Self::carried`] and [`Self::solution`].
+    pub fn carrying(size: usize, upper: Vec<Block>) -> Option<Self> {
+        let mut factor = Self { size, blocks: upper.len() / size.max(1), upper, unit: VectorUnit::widest() };
         dispatch(factor.unit, Eliminate { factor: &mut factor }).then_some(factor)
     }
 
@@ -54,26 +60,27 @@ impl Factor {
         sum + product.ln()
     }
 
-    /// `m^-1 right`.
-    pub fn solve(&self, right: &[f64]) -> Vec<f64> {
-        let mut left = vec![[0.0; MAX_LANES]; self.blocks];
-        left.as_flattened_mut()[..self.size].copy_from_slice(right);
+    /// `right' m^-1 right` of the right side that was carried along.
+    pub fn carried(&self) -> f64 {
+        self.carried_entries().zip(self.pivots()).map(|(entry, pivot)| entry * entry / pivot).sum()
+    }
+
+    /// `m^-1 right` of the right side that was carried along.
+    pub fn solution(&self) -> Vec<f64> {
         let mut solution = vec![[0.0; MAX_LANES]; self.blocks];
-        dispatch(self.unit, Solve { factor: self, left: &mut left, solution: &mut solution });
+        let eliminated = &self.carried_entries().collect::<Vec<_>>()[..];
+        dispatch(self.unit, Backward { factor: self, eliminated, solution: &mut solution });
         solution.as_flattened()[..self.size].to_vec()
     }
 
-    /// `R` with `R R' = m^-1`: `D^-1/2 L^-1`, transposed, row by row in rows of `across`; zero below the diagonal.
+    fn carried_entries(&self) -> impl Iterator<Item = f64> {
+        self.upper.chunks_exact(self.blocks).map(|row| row.as_flattened()[self.size])
+    }
+
+    /// `R` with `R R' = m^-1`: `U^-1 D^1/2`, row by row in rows of `across`, whole blocks; zero below the diagonal.
     pub fn inverse_root(&self, across: usize) -> Vec<f64> {
-        let mut lower = vec![[0.0; MAX_LANES]; self.size * self.blocks];
-        dispatch(self.unit, Invert { factor: self, lower: &mut lower, inverse: &mut [] });
         let mut root = vec![0.0; self.size * across];
-        for (j, (row, pivot)) in lower.chunks_exact(self.blocks).zip(self.pivots()).enumerate() {
-            let scale = 1.0 / pivot.sqrt();
-            for (i, entry) in row.as_flattened()[..=j].iter().enumerate() {
-                root[i * across + j] = scale * entry;
-            }
-        }
+        dispatch(self.unit, Root { factor: self, across, out: &mut root });
         root
     }
 
@@ -116,7 +123,45 @@ fn take_off<S: Simd, const COUNT: usize>(
     }
 }
 
-/// Eliminates row by row; whether every pivot is positive and finite.
+/// Vectors of a row that are summed together.
+const VECTORS: usize = 3;
+
+/// Adds products of factors with other rows to vectors of a few rows.
+#[inline(always)]
+fn add<S: Simd, const COUNT: usize>(
+    simd: S,
+    rows: &mut [f64],
+    across: usize,
+    at: usize,
+    (factors, others): (&[[f64; TOGETHER]], &[f64]),
+) {
+    let mut totals = [[simd.splat(0.0); COUNT]; TOGETHER];
+    for (line, row) in totals.iter_mut().zip(rows.chunks_exact(across)) {
+        for (v, total) in line.iter_mut().enumerate() {
+            *total = simd.load(&row[at + v * S::LANES..]);
+        }
+    }
+    for (factors, other) in factors.iter().zip(others.chunks_exact(across)) {
+        let other = &other[at..at + COUNT * S::LANES];
+        let mut values = [simd.splat(0.0); COUNT];
+        for (v, value) in values.iter_mut().enumerate() {
+            *value = simd.load(&other[v * S::LANES..]);
+        }
+        for (line, factor) in totals.iter_mut().zip(factors) {
+            let factor = simd.splat(*factor);
+            for (total, value) in line.iter_mut().zip(values) {
+                *total = factor.mul_add(value, *total);
+            }
+        }
+    }
+    for (line, row) in totals.iter().zip(rows.chunks_exact_mut(across)) {
+        for (v, total) in line.iter().enumerate() {
+            total.store(&mut row[at + v * S::LANES..]);
+        }
+    }
+}
+
+/// Eliminates a few rows at a time; whether every pivot is positive and finite.
 struct Eliminate<'a> {
     factor: &'a mut Factor,
 }
@@ -127,57 +172,114 @@ impl Kernel for Eliminate<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> bool {
         let Factor { size, blocks, upper, .. } = self.factor;
-        let (size, blocks) = (*size, *blocks);
+        let (size, across) = (*size, *blocks * MAX_LANES);
+        let mut inverses = Vec::with_capacity(size);
+        let mut factors: Vec<[f64; TOGETHER]> = Vec::with_capacity(size);
         for k in (0..size).step_by(TOGETHER) {
             let end = (k + TOGETHER).min(size);
-            let (done, rest) = upper.split_at_mut(end * blocks);
-            let done = &mut done[k * blocks..];
-            let mut inverses = [0.0; TOGETHER];
+            let (done, rest) = upper.as_flattened_mut().split_at_mut(k * across);
+            let rows = &mut rest[..(end - k) * across];
+            factors.clear();
+            for (row, inverse) in done.chunks_exact(across).zip(&inverses) {
+                // Of rows that are missing nothing is kept.
+                factors.push(std::array::from_fn(|r| -row[k..k + TOGETHER][r] * inverse));
+            }
+            let mut at = k / S::LANES * S::LANES;
+            while at + VECTORS * S::LANES <= across {
+                add::<S, VECTORS>(simd, rows, across, at, (&factors, done));
+                at += VECTORS * S::LANES;
+            }
+            while at < across {
+                add::<S, 1>(simd, rows, across, at, (&factors, done));
+                at += S::LANES;
+            }
             for p in k..end {
-                let (row, others) = done[(p - k) * blocks..].split_at_mut(blocks);
-                let entries = row.as_flattened();
-                if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&entries[p]) {
+                let (row, others) = rows[(p - k) * across..].split_at_mut(across);
+                if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&row[p]) {
                     return false;
                 }
-                inverses[p - k] = 1.0 / entries[p];
-                for (other, i) in others.chunks_exact_mut(blocks).zip(p + 1..) {
-                    let first = i / MAX_LANES;
-                    take_off(simd, &mut other[first..], [entries[i] * inverses[p - k]], [&row[first..]]);
+                let inverse = 1.0 / row[p];
+                inverses.push(inverse);
+                for (other, i) in others.chunks_exact_mut(across).zip(p + 1..) {
+                    let factor = simd.splat(row[i] * inverse);
+                    for at in (i / S::LANES * S::LANES..across).step_by(S::LANES) {
+                        let left = factor.neg_mul_add(simd.load(&row[at..]), simd.load(&other[at..]));
+                        left.store(&mut other[at..]);
+                    }
                 }
-            }
-            // Rows are left below only where the block is full.
-            let rows: [&[Block]; TOGETHER] =
-                std::array::from_fn(|p| done.get(p * blocks..(p + 1) * blocks).unwrap_or_default());
-            for (line, i) in rest.chunks_exact_mut(blocks).zip(end..) {
-                let first = i / MAX_LANES;
-                let factors = std::array::from_fn(|p| rows[p].as_flattened()[i] * inverses[p]);
-                take_off(simd, &mut line[first..], factors, rows.map(|row| &row[first..]));
             }
         }
         true
     }
 }
 
-/// `m^-1 left`; the solution is zero before.
-struct Solve<'a> {
+/// `U^-1 D^1/2` in rows of `across`, from the last; zero before.
+struct Root<'a> {
     factor: &'a Factor,
-    left: &'a mut [Block],
-    solution: &'a mut [Block],
+    across: usize,
+    out: &'a mut [f64],
 }
 
-impl Kernel for Solve<'_> {
+impl Kernel for Root<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Factor { size, blocks, upper, .. } = self.factor;
-        let mut eliminated = Vec::with_capacity(*size);
-        for (k, row) in upper.chunks_exact(*blocks).enumerate() {
-            let (first, value) = (k / MAX_LANES, self.left.as_flattened()[k]);
-            eliminated.push(value);
-            // What stands before it in its block has been read already.
-            take_off(simd, &mut self.left[first..], [value / row.as_flattened()[k]], [&row[first..]]);
+        let Self { factor: Factor { size, blocks, upper, .. }, across, out } = self;
+        let width = *blocks * MAX_LANES;
+        let upper = upper.as_flattened();
+        let filled = size.next_multiple_of(S::LANES);
+        let mut factors: Vec<[f64; TOGETHER]> = Vec::with_capacity(*size);
+        for k in (0..*size).step_by(TOGETHER).rev() {
+            let end = (k + TOGETHER).min(*size);
+            let (rows, done) = out[k * across..].split_at_mut((end - k) * across);
+            // Of rows that are missing the last again: it is not stored.
+            let of: [&[f64]; TOGETHER] =
+                std::array::from_fn(|r| &upper[(k + r).min(end - 1) * width..][..width]);
+            factors.clear();
+            factors.extend((end..*size).map(|p| of.map(|row| -row[p])));
+            // Of each vector the rows that reach it.
+            let products = |last: usize| (&factors[..last.min(*size).saturating_sub(end)], &*done);
+            let mut at = k / S::LANES * S::LANES;
+            while at + VECTORS * S::LANES <= filled {
+                add::<S, VECTORS>(simd, rows, across, at, products(at + VECTORS * S::LANES));
+                at += VECTORS * S::LANES;
+            }
+            while at < filled {
+                add::<S, 1>(simd, rows, across, at, products(at + S::LANES));
+                at += S::LANES;
+            }
+            for p in (k..end).rev() {
+                let (others, row) = rows.split_at_mut((p - k) * across);
+                let pivot = of[p - k][p];
+                row[p] = pivot.sqrt();
+                let inverse = simd.splat(1.0 / pivot);
+                for at in (p / S::LANES * S::LANES..filled).step_by(S::LANES) {
+                    let value = simd.load(&row[at..]) * inverse;
+                    value.store(&mut row[at..]);
+                    for (other, of) in others.chunks_exact_mut(across).zip(of) {
+                        let left = simd.splat(of[p]).neg_mul_add(value, simd.load(&other[at..]));
+                        left.store(&mut other[at..]);
+                    }
+                }
+            }
         }
+    }
+}
+
+/// `U^-1 eliminated`; the solution is zero before.
+struct Backward<'a> {
+    factor: &'a Factor,
+    eliminated: &'a [f64],
+    solution: &'a mut [Block],
+}
+
+impl Kernel for Backward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Factor { blocks, upper, .. } = self.factor;
         for (k, row) in upper.chunks_exact(*blocks).enumerate().rev() {
             let mut known = simd.splat(0.0);
             // What is not known yet is zero.
@@ -186,14 +288,13 @@ impl Kernel for Solve<'_> {
                     known = simd.load(&row[at..]).mul_add(simd.load(&solution[at..]), known);
                 }
             }
-            let value = (eliminated[k] - known.sum()) / row.as_flattened()[k];
+            let value = (self.eliminated[k] - known.sum()) / row.as_flattened()[k];
             self.solution.as_flattened_mut()[k] = value;
         }
     }
 }
 
-/// `L^-1` and, where there is room for it, `(L^-1)' D^-1 L^-1` for `U = D L'`, lower triangles row by row; both zero
-/// before.
+/// `L^-1` and `(L^-1)' D^-1 L^-1` for `U = D L'`, lower triangles row by row; both zero before.
 struct Invert<'a> {
     factor: &'a Factor,
     lower: &'a mut [Block],
@@ -243,59 +344,4 @@ impl Kernel for Invert<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use nalgebra::{DMatrix, DVector};
-
-    use super::*;
-    use crate::testing::Random;
-
-    /// A positive definite matrix whose rows differ by orders of magnitude.
-    fn positive(random: &mut Random, size: usize) -> DMatrix<f64> {
-        let root =
-            DMatrix::from_fn(size, size + 3, |i, _| random.normal() * 10_f64.powf((i % 7) as f64 - 3.0));
-        &root * root.transpose()
-    }
-
-    #[test]
-    fn inverses_and_determinants_are_those_of_other_factorisations() {
-        let random = &mut Random::new(3);
-        for size in 1..24 {
-            let m = positive(random, size);
-            let factor = Factor::new(&m).unwrap();
-            let scale = DMatrix::from_diagonal(&m.diagonal().map(|d| d.sqrt().recip()));
-            let correlation = &scale * &m * &scale;
-            let expected = &scale * correlation.clone().lu().try_inverse().unwrap() * &scale;
-            let inverse = factor.inverse();
-            let root = DMatrix::from_row_slice(size, size, &factor.inverse_root(size));
-            let squared = &root * root.transpose();
-            for i in 0..size {
-                for j in 0..size {
-                    let unit = (expected[(i, i)] * expected[(j, j)]).sqrt();
-                    assert!((inverse[(i, j)] - expected[(i, j)]).abs() < 1e-9 * unit);
-                    assert!((squared[(i, j)] - expected[(i, j)]).abs() < 1e-9 * unit);
-                    assert!(i <= j || root[(i, j)] == 0.0);
-                }
-            }
-            let right: Vec<f64> = (0..size).map(|_| random.normal()).collect();
-            let solution = &m * DVector::from_vec(factor.solve(&right));
-            for (i, (a, b)) in solution.iter().zip(&right).enumerate() {
-                assert!((a - b).abs() < 1e-8 * m[(i, i)].sqrt().max(1.0), "{a} {b}");
-            }
-            let log = correlation.lu().determinant().ln() - 2.0 * scale.diagonal().map(f64::ln).sum();
-            assert!((factor.log_determinant() - log).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn what_is_not_positive_definite_is_refused() {
-        let m = positive(&mut Random::new(4), 5);
-        assert!(Factor::new(&-&m).is_none());
-        for (i, value) in [(0, f64::NAN), (4, f64::INFINITY), (2, 0.0), (3, -1e-9)] {
-            let mut broken = m.clone();
-            broken[(i, i)] = value;
-            assert!(Factor::new(&broken).is_none(), "{i} {value}");
-        }
-        let one = DMatrix::from_element(3, 3, 1.0);
-        assert!(Factor::new(&one).is_none());
-    }
-}
+mod tests;

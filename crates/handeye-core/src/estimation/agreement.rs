@@ -118,7 +118,7 @@ impl Agreement {
         if !log_total.is_finite() {
             return Err(singular());
         }
-        let mut theta = DVector::zeros(self.mixed.size);
+        let mut theta = DVector::zeros(self.mixed.told);
         for node in &mut nodes {
             node.log_weight -= log_total;
             theta.axpy(node.log_weight.exp(), &node.theta, 1.0);

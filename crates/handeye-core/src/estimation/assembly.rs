@@ -4,22 +4,35 @@ use nalgebra::{DMatrix, DVector};
 
 use super::cell::Cell;
 use super::component::{Component, Effect};
-use super::linearisation::Linearisation;
+use super::linearisation::{Linearisation, Rows};
 use super::mixed::{Mixed, Noise, Prior, Settled, Station, covariances};
+use super::recurring::{FUNCTIONS, squared};
+use crate::positive::Block;
 use crate::simd::{MAX_LANES, VectorUnit};
 
 impl Prior {
     /// Of new parameters with columns of their own, whose place is not known yet.
-    fn of_columns(of: &'static str, levels: Vec<usize>, columns: &[DMatrix<f64>], recurring: bool) -> Self {
+    fn of_columns(
+        of: &'static str,
+        levels: Vec<usize>,
+        columns: &[DMatrix<f64>],
+        functions: Vec<Block>,
+    ) -> Self {
         let count = columns.first().map_or(0, DMatrix::ncols);
-        let squares = if recurring { columns.iter().map(square).collect() } else { vec![] };
-        Self { of, levels, first: 0, count, information: None, mean: None, recurring, squares }
+        let squares = columns.iter().zip(&functions).map(|(m, f)| square(m) * squared(f)).collect();
+        let recurring = !functions.is_empty();
+        Self { of, levels, first: 0, count, information: None, mean: None, recurring, functions, squares }
     }
 }
 
 /// `m m'`.
 pub(super) fn square(m: &DMatrix<f64>) -> DMatrix<f64> {
-    m * m.transpose()
+    // Of few columns.
+    let mut sum = DMatrix::zeros(m.nrows(), m.nrows());
+    for column in m.column_iter() {
+        sum.ger(1.0, &column, &column, 1.0);
+    }
+    sum
 }
 
 /// Matrices of as many rows, row by row, padded to whole vectors.
@@ -59,10 +72,10 @@ impl Mixed {
                         noises.push(Noise { of: component.name(), levels: of, roots, columns, squares });
                     }
                     Effect::Constant(columns) => {
-                        blocks.push((Prior::of_columns(component.name(), of, &columns, false), columns));
+                        blocks.push((Prior::of_columns(component.name(), of, &columns, vec![]), columns));
                     }
-                    Effect::Recurring(columns) => {
-                        blocks.push((Prior::of_columns(component.name(), of, &columns, true), columns));
+                    Effect::Recurring { columns, functions } => {
+                        blocks.push((Prior::of_columns(component.name(), of, &columns, functions), columns));
                     }
                     Effect::Prior { first, information, mean } => priors.push(Prior {
                         of: component.name(),
@@ -72,67 +85,63 @@ impl Mixed {
                         information: Some(information),
                         mean: Some(mean),
                         recurring: false,
+                        functions: vec![],
                         squares: vec![],
                     }),
                 }
             }
         }
-        // Recurring parameters come last: the answer does not name them.
-        blocks.sort_by_key(|(prior, _)| prior.recurring);
         let poses = linearisation.information.nrows();
-        let mut size = poses;
-        let mut told = poses;
+        let (mut told, mut twists) = (poses, 0);
         for (prior, _) in &mut blocks {
-            prior.first = size;
-            constants.push((prior.of, prior.range()));
-            size += prior.count;
+            let next = if prior.recurring { &mut twists } else { &mut told };
+            prior.first = *next;
+            *next += prior.count;
             if !prior.recurring {
-                told = size;
+                constants.push((prior.of, prior.range()));
             }
         }
-        let width = (size + 1).next_multiple_of(MAX_LANES);
-        let stations: Vec<Station> = linearisation
-            .stations
-            .iter()
-            .enumerate()
-            .map(|(k, from)| {
-                let rows_of = from.e.len();
-                let mut rows = vec![0.0; rows_of * width];
-                for (r, row) in rows.chunks_exact_mut(width).enumerate() {
-                    for (j, entry) in row[..poses].iter_mut().enumerate() {
-                        *entry = from.b[(r, j)];
+        let lead = twists.next_multiple_of(MAX_LANES);
+        let width = (lead + told + 1).next_multiple_of(MAX_LANES);
+        let of_station = |(k, from): (usize, &Rows)| {
+            let size = from.e.len();
+            let mut rows = vec![0.0; size * width];
+            for (r, row) in rows.chunks_exact_mut(width).enumerate() {
+                for (prior, columns) in &blocks {
+                    let first = if prior.recurring { 0 } else { lead } + prior.first;
+                    for (entry, column) in row[first..].iter_mut().zip(columns[k].row(r).iter()) {
+                        *entry = *column;
                     }
-                    let mut at = poses;
-                    for (_, columns) in &blocks {
-                        for j in 0..columns[k].ncols() {
-                            row[at] = columns[k][(r, j)];
-                            at += 1;
-                        }
-                    }
-                    row[size] = from.e[r];
                 }
-                let of: Vec<&DMatrix<f64>> = noises.iter().map(|x: &Noise| &x.roots[k]).collect();
-                Station {
-                    size: rows_of,
-                    rows,
-                    roots: in_one(rows_of, &of),
-                    pixels: from.pixels.clone(),
-                    arm: from.flange.clone(),
-                    reduced: false,
+                for (entry, column) in row[lead..].iter_mut().zip(from.b.row(r).iter()) {
+                    *entry = *column;
                 }
-            })
-            .collect();
+                row[lead + told] = from.e[r];
+            }
+            let of: Vec<&DMatrix<f64>> = noises.iter().map(|x: &Noise| &x.roots[k]).collect();
+            Station {
+                size,
+                rows,
+                roots: in_one(size, &of),
+                pixels: from.pixels.clone(),
+                arm: from.flange.clone(),
+                reduced: false,
+            }
+        };
+        let stations: Vec<Station> = linearisation.stations.iter().enumerate().map(of_station).collect();
         priors.extend(blocks.into_iter().map(|(prior, _)| prior));
-        let mut given = DMatrix::zeros(size, size);
-        let mut given_right = DVector::zeros(size);
+        let mut given = DMatrix::zeros(told, told);
+        let mut given_right = DVector::zeros(told);
         given.view_mut((0, 0), (poses, poses)).copy_from(&(&linearisation.information + weak.0));
         given_right.rows_mut(0, poses).copy_from(&(&linearisation.gradient + weak.1));
         Self {
             levels,
-            size,
+            size: FUNCTIONS * twists + told,
             told,
+            twists,
             components: owners,
             constants,
+            lead,
             width,
             covariances: covariances(&stations, &noises, &priors),
             stations,
@@ -140,7 +149,7 @@ impl Mixed {
             priors,
             given,
             given_right,
-            settled: Settled { rows: 0, information: DMatrix::zeros(size, size), constant: 0.0 },
+            settled: Settled { rows: 0, information: DMatrix::zeros(told, told), constant: 0.0 },
             unit: VectorUnit::widest(),
         }
     }

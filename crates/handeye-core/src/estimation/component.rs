@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::cell::Cell;
 use super::levels::Level;
 use super::linearisation::{Linearisation, Rows};
+use crate::positive::Block;
 
 /// One thing that can be wrong.
 pub(super) trait Component {
@@ -35,8 +36,14 @@ pub(super) enum Effect {
     /// The same at all stations: columns of new parameters, one matrix per station.
     Constant(Vec<DMatrix<f64>>),
     /// As `Constant`, but what all stations share of it cannot be told from the poses and comes again whenever the arm
-    /// works: the answer is given as if it were new at every station, and its covariance is as it is.
-    Recurring(Vec<DMatrix<f64>>),
+    /// works: the answer is given as if it were new at every station, and its covariance is as it is. A parameter is the
+    /// coefficient of one of a few functions in one column.
+    Recurring {
+        /// One matrix per station.
+        columns: Vec<DMatrix<f64>>,
+        /// Values of the [`FUNCTIONS`](super::recurring::FUNCTIONS) at each station, zero behind them.
+        functions: Vec<Block>,
+    },
     /// A prior on parameters that are there already.
     Prior {
         /// First of them.

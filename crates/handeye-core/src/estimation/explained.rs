@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 
 use super::mixed::{Mixed, Prior, Wanted};
+use super::recurring::squared;
 
 impl Mixed {
     /// The penalised likelihood without a component: its deviations at nothing, its ratios at their start.
@@ -45,14 +46,18 @@ impl Mixed {
             add(x.of, Self::deviation(&x.levels, t).powi(2) * squared);
         }
         for p in &self.priors {
-            let of = rows.chunks_exact(self.width).map(|row| &row[p.range()]);
             if p.recurring {
                 // What it is here is not told; what it may be is.
-                let squared: f64 = of.flatten().map(|v| v * v).sum();
-                add(p.of, Self::deviation(&p.levels, t).powi(2) * squared);
+                let sizes = self.stations.iter().zip(&p.functions);
+                let sizes = sizes.flat_map(|(station, f)| std::iter::repeat_n(squared(f), station.size));
+                let of = rows.chunks_exact(self.width).zip(sizes);
+                let moved =
+                    |(row, size): (&[f64], f64)| row[p.range()].iter().map(|v| v * v).sum::<f64>() * size;
+                add(p.of, Self::deviation(&p.levels, t).powi(2) * of.map(moved).sum::<f64>());
             } else {
                 let values = Self::deviation_from(p, theta);
                 let moved = |row: &[f64]| row.iter().zip(values.iter()).map(|(b, x)| b * x).sum::<f64>();
+                let of = rows.chunks_exact(self.width).map(|row| &row[self.lead..][p.range()]);
                 add(p.of, of.map(|row| moved(row).powi(2)).sum());
             }
         }

@@ -12,9 +12,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::levels::{Level, LevelPrior};
-use super::products::{Accumulate, TOGETHER};
+use super::recurring::FUNCTIONS;
 use super::station_covariances::{StationCovariances, StationFactors, Whiten};
-use crate::positive::Factor;
+use crate::positive::{Block, Factor};
 use crate::simd::{MAX_LANES, VectorUnit, dispatch};
 
 /// A prior on parameters.
@@ -22,12 +22,15 @@ use crate::simd::{MAX_LANES, VectorUnit, dispatch};
 pub(super) struct Prior {
     pub of: &'static str,
     pub levels: Vec<usize>,
+    /// First of the answer's parameters that it is about, or, where it recurs, of the columns of what recurs.
     pub first: usize,
     pub count: usize,
     /// `None`: the identity.
     pub information: Option<DMatrix<f64>>,
     pub mean: Option<DVector<f64>>,
     pub recurring: bool,
+    /// Of recurring ones: values of the functions at the stations.
+    pub functions: Vec<Block>,
     /// Of recurring ones: covariances of the stations at a deviation of one.
     pub squares: Vec<DMatrix<f64>>,
 }
@@ -38,11 +41,8 @@ impl Prior {
     }
 
     /// Information times a vector.
-    pub fn times(&self, v: &[f64]) -> Vec<f64> {
-        match &self.information {
-            None => v.to_vec(),
-            Some(m) => (m * DVector::from_column_slice(v)).as_slice().to_vec(),
-        }
+    pub fn times(&self, v: &DVector<f64>) -> DVector<f64> {
+        self.information.as_ref().map_or_else(|| v.clone(), |m| m * v)
     }
 }
 
@@ -77,7 +77,7 @@ pub(super) struct Whitened {
 #[derive(Clone)]
 pub(super) struct Station {
     pub size: usize,
-    /// `[B e]` row by row, padded to whole vectors.
+    /// Columns of what recurs and, from [`Mixed::lead`] on, `[B e]`, row by row, padded to whole vectors.
     pub rows: Vec<f64>,
     /// Roots of all noises side by side, row by row, padded to whole vectors.
     pub roots: Vec<f64>,
@@ -101,14 +101,18 @@ pub(super) struct Settled {
 /// A cell linearised, with its components.
 pub(super) struct Mixed {
     pub levels: Vec<Level>,
-    /// Parameters of the answer: poses, cameras, boards, and constants of the arm.
+    /// All parameters.
     pub size: usize,
-    /// Those of them before the recurring ones.
+    /// Parameters of the answer: poses, cameras, boards, and constants of the arm.
     pub told: usize,
+    /// Columns of what recurs, each with a coefficient per function.
+    pub twists: usize,
     /// Names of the components, with the range of their levels.
     pub components: Vec<(&'static str, std::ops::Range<usize>)>,
     /// Names of the components, with the range of their constants.
     pub constants: Vec<(&'static str, std::ops::Range<usize>)>,
+    /// Where the answer's columns begin in the rows of stations, and how wide these are.
+    pub lead: usize,
     pub width: usize,
     pub stations: Vec<Station>,
     pub noises: Vec<Noise>,
@@ -150,7 +154,7 @@ pub(super) struct Evaluation {
     pub slope: DVector<f64>,
     /// Its curvature.
     pub curvature: DMatrix<f64>,
-    /// The parameters.
+    /// The parameters of the answer; not where the value alone was wanted.
     pub theta: DVector<f64>,
     /// Their covariance, where an answer was wanted.
     pub covariance: DMatrix<f64>,
@@ -167,8 +171,11 @@ impl Mixed {
         let noise = |x: &Noise| Noise { roots: of(&x.roots), squares: of(&x.squares), ..x.clone() };
         let stations: Vec<Station> = chosen.iter().map(|k| self.stations[*k].clone()).collect();
         let noises: Vec<Noise> = self.noises.iter().map(noise).collect();
-        let priors: Vec<Prior> =
-            self.priors.iter().map(|p| Prior { squares: of(&p.squares), ..p.clone() }).collect();
+        let prior = |p: &Prior| {
+            let functions = chosen.iter().filter_map(|k| p.functions.get(*k)).copied().collect();
+            Prior { squares: of(&p.squares), functions, ..p.clone() }
+        };
+        let priors: Vec<Prior> = self.priors.iter().map(prior).collect();
         Self {
             levels: self.levels.clone(),
             components: self.components.clone(),
@@ -207,8 +214,8 @@ impl Mixed {
         for x in &self.noises {
             add(&mut noise, Self::deviation(&x.levels, t).powi(2), &x.squares[k]);
         }
-        let rows = DMatrix::from_fn(station.size, self.size, |i, j| station.rows[i * self.width + j]);
-        let e = DVector::from_fn(station.size, |i, _| station.rows[i * self.width + self.size]);
+        let rows = DMatrix::from_fn(station.size, self.told, |i, j| station.rows[i * self.width + j]);
+        let e = DVector::from_fn(station.size, |i, _| station.rows[i * self.width + self.told]);
         (noise, e + &rows * theta, &rows * covariance * rows.transpose())
     }
 
@@ -237,31 +244,29 @@ impl Mixed {
 
     /// The model at levels `exp(t)`; `None` where it is singular or not finite.
     pub fn evaluate(&self, t: &DVector<f64>, wanted: Wanted) -> Option<Evaluation> {
-        let n = self.size;
         let noise: Vec<f64> = self.noises.iter().map(|x| Self::deviation(&x.levels, t)).collect();
         let prior: Vec<f64> = self.priors.iter().map(|x| Self::deviation(&x.levels, t)).collect();
-        let mut sum = vec![0.0; (n + 1).next_multiple_of(TOGETHER) * self.width];
-        let mut constant = self.settled.constant;
         let (whitened, log_determinant) = self.whitened(&noise, None)?;
-        constant += log_determinant;
-        dispatch(self.unit, Accumulate::pairs(&whitened.rows, self.width, n + 1, &mut sum));
-        constant += sum[n * self.width + n];
-        let mut information = self.given.clone();
-        let mut right = self.given_right.clone();
-        // The lower triangle, which is what is factorised.
-        let columns = information.as_mut_slice().chunks_exact_mut(n);
-        for (i, (column, row)) in columns.zip(sum.chunks_exact(self.width)).enumerate() {
-            right[i] -= row[n];
-            for (entry, value) in column[i..].iter_mut().zip(&row[i..n]) {
-                *entry += value;
-            }
-        }
+        let mut constant = self.settled.constant + log_determinant;
+        let (mut given, mut right) = (self.given.clone(), self.given_right.clone());
         for (p, s) in self.priors.iter().zip(&prior) {
-            constant += Self::add_prior(p, *s, &mut information, &mut right);
+            constant += if p.recurring {
+                2.0 * (FUNCTIONS * p.count) as f64 * s.ln()
+            } else {
+                Self::add_prior(p, *s, &mut given, &mut right)
+            };
         }
-        let factor = Factor::new(&information)?;
-        let theta = DVector::from_vec(factor.solve(right.as_slice()));
-        constant += factor.log_determinant() - right.dot(&theta);
+        let (system, squared) = self.system(&whitened.rows, (&given, &right), &prior);
+        let apart = self.twists > 0;
+        let told = self.told;
+        let information = if wanted == Wanted::Answer && !apart {
+            let width = system.len() / told * MAX_LANES;
+            DMatrix::from_fn(told, told, |i, j| system.as_flattened()[i.min(j) * width + i.max(j)])
+        } else {
+            DMatrix::zeros(0, 0)
+        };
+        let factor = Factor::carrying(self.size, system)?;
+        constant += squared + factor.log_determinant() - factor.carried();
         let mut value = 0.5 * constant;
         let count = self.levels.len();
         let mut slope = DVector::zeros(count);
@@ -275,22 +280,23 @@ impl Mixed {
         if !value.is_finite() {
             return None;
         }
-        let apart = wanted == Wanted::Answer && self.told < n;
-        let covariance = match wanted {
-            Wanted::Answer if !apart => factor.inverse(),
-            _ => DMatrix::zeros(0, 0),
+        let mut evaluation = Evaluation {
+            value,
+            slope,
+            curvature,
+            theta: DVector::zeros(0),
+            covariance: DMatrix::zeros(0, 0),
+            information,
         };
-        let mut evaluation =
-            Evaluation { value, slope, curvature, theta, covariance, information: DMatrix::zeros(0, 0) };
         match wanted {
             Wanted::Value => {}
             Wanted::Slope => self.differentiate(&whitened, &factor, (&noise, &prior), &mut evaluation),
             Wanted::Answer if apart => {
-                self.answer_apart(&whitened.factors, &noise, &prior, &mut evaluation)?;
+                self.answer_apart((&noise, &prior), (given, right), &mut evaluation)?;
             }
             Wanted::Answer => {
-                information.fill_upper_triangle_with_lower_triangle();
-                evaluation.information = information;
+                evaluation.theta = -DVector::from_vec(factor.solution());
+                evaluation.covariance = factor.inverse();
             }
         }
         Some(evaluation)
@@ -312,7 +318,7 @@ impl Mixed {
             }
         }
         if let Some(mean) = &p.mean {
-            let pull = DVector::from_vec(p.times(mean.as_slice())) * weight;
+            let pull = p.times(mean) * weight;
             constant += pull.dot(mean);
             let mut view = right.rows_mut(p.first, p.count);
             view += pull;

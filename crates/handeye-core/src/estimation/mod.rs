@@ -10,6 +10,7 @@
 //! Sources: Patterson and Thompson 1971 and Harville 1977 (restricted likelihood), Gilmour, Thompson and Cullis 1995
 //! (average information), Rue, Martino and Chopin 2009 (nested Laplace), Huber 1967 and White 1980 (sandwich).
 
+mod acts;
 mod agreement;
 mod assembly;
 mod cell;
@@ -24,11 +25,13 @@ mod levels;
 mod linearisation;
 mod mixed;
 mod nodes;
+mod normal_equations;
 mod pixel_field;
 mod pixel_rows;
 mod pose_measurement;
 mod posterior;
 mod products;
+mod recurring;
 mod reduction;
 mod sandwich;
 mod slopes;

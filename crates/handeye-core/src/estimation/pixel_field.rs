@@ -54,7 +54,7 @@ pub(super) fn quadratic(
     let scale = residual + 1;
     let grams = seen.rows()?.map(|rows| {
         let mut gram = vec![0.0; (scale + 1).next_multiple_of(TOGETHER) * width];
-        dispatch(VectorUnit::widest(), Accumulate::pairs(&rows, width, scale + 1, &mut gram));
+        dispatch(VectorUnit::widest(), Accumulate::pairs(&rows, width, 0, scale + 1, &mut gram));
         gram
     });
     let product = |i: usize, j: usize| {

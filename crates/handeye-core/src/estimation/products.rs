@@ -14,18 +14,21 @@ const NEAR: usize = 32;
 pub(super) struct Accumulate<'a> {
     pub left: &'a [f64],
     pub width: usize,
-    /// Columns of the left that take part.
+    /// First column of the left that takes part, and how many do.
+    pub first: usize,
     pub size: usize,
     pub right: &'a [f64],
     pub across: usize,
+    /// First column of the right that is wanted.
+    pub from: usize,
     pub upper: bool,
     pub sum: &'a mut [f64],
 }
 
 impl<'a> Accumulate<'a> {
-    /// All pairs of the first columns of one matrix.
-    pub fn pairs(rows: &'a [f64], width: usize, size: usize, sum: &'a mut [f64]) -> Self {
-        Self { left: rows, width, size, right: rows, across: width, upper: true, sum }
+    /// All pairs of columns of one matrix from `first` on, with `sum` in rows as wide.
+    pub fn pairs(rows: &'a [f64], width: usize, first: usize, size: usize, sum: &'a mut [f64]) -> Self {
+        Self { left: rows, width, first, size, right: rows, across: width, from: 0, upper: true, sum }
     }
 }
 
@@ -34,12 +37,13 @@ impl Kernel for Accumulate<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { width, size, across, upper, sum, .. } = self;
+        let Self { width, first, size, across, from: start, upper, sum, .. } = self;
         let pieces = self.left.chunks(NEAR * width).zip(self.right.chunks(NEAR * across));
         for (left, right) in pieces {
             for i in (0..size).step_by(TOGETHER) {
-                let mut at = if upper { i / S::LANES * S::LANES } else { 0 };
-                let rows = || left.chunks_exact(width).map(|row| &row[i..i + TOGETHER]);
+                let from = first + i;
+                let mut at = if upper { from / S::LANES * S::LANES } else { start };
+                let rows = || left.chunks_exact(width).map(|row| &row[from..from + TOGETHER]);
                 while at + 2 * S::LANES <= across {
                     add_products::<S, 2>(simd, rows(), right, across, at, &mut sum[i * across..]);
                     at += 2 * S::LANES;
@@ -91,63 +95,89 @@ pub(super) struct Product<'a> {
     /// Row by row, `across` apart; as many rows as columns of the rows take part.
     pub matrix: &'a [f64],
     pub across: usize,
-    /// First columns of the matrix that are zero below the diagonal.
-    pub triangular: usize,
     pub out: &'a mut [f64],
 }
 
 /// Rows that are multiplied together.
-const ROWS: usize = 6;
+pub(super) const ROWS: usize = 6;
 
 impl Kernel for Product<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let count = self.rows.len() / self.width;
-        for first in (0..count).step_by(ROWS) {
-            for at in (0..self.across).step_by(S::LANES) {
-                let mut totals = [simd.splat(0.0); ROWS];
-                let end = at + S::LANES;
-                let rows = if end <= self.triangular { end } else { usize::MAX };
-                for (i, line) in self.matrix.chunks_exact(self.across).enumerate().take(rows) {
-                    let values = simd.load(&line[at..]);
-                    for (k, total) in totals.iter_mut().enumerate() {
-                        // Where rows run out, the last of them again.
-                        let row = (first + k).min(count - 1);
-                        *total = simd.splat(self.rows[row * self.width + i]).mul_add(values, *total);
-                    }
-                }
-                for (k, total) in totals.iter().enumerate().take(count - first) {
-                    total.store(&mut self.out[(first + k) * self.across + at..]);
-                }
+        let Self { rows, width, matrix, across, out } = self;
+        for (rows, out) in rows.chunks(ROWS * width).zip(out.chunks_mut(ROWS * across)) {
+            let mut at = 0;
+            while at + 2 * S::LANES <= across {
+                multiply::<S, 2>(simd, (rows, width), (matrix, across, at), usize::MAX, (out, across, at));
+                at += 2 * S::LANES;
+            }
+            while at < across {
+                multiply::<S, 1>(simd, (rows, width), (matrix, across, at), usize::MAX, (out, across, at));
+                at += S::LANES;
             }
         }
     }
 }
 
-/// Products of all rows of one matrix with all of another, over their first `width` columns.
-pub(super) struct RowProducts<'a> {
-    pub left: &'a [f64],
+/// A few rows times a few whole vectors of the first rows of a matrix; where they are in it, and where they come to stand.
+#[inline(always)]
+pub(super) fn multiply<S: Simd, const VECTORS: usize>(
+    simd: S,
+    (rows, width): (&[f64], usize),
+    (matrix, across, at): (&[f64], usize, usize),
+    height: usize,
+    (out, out_across, to): (&mut [f64], usize, usize),
+) {
+    let height = height.min(matrix.len() / across);
+    // Where rows run out, the last of them again.
+    let last = rows.len() / width - 1;
+    let rows: [&[f64]; ROWS] = std::array::from_fn(|k| &rows[k.min(last) * width..][..height]);
+    let mut totals = [[simd.splat(0.0); VECTORS]; ROWS];
+    for (i, line) in matrix.chunks_exact(across).enumerate().take(height) {
+        let mut values = [simd.splat(0.0); VECTORS];
+        for (v, value) in values.iter_mut().enumerate() {
+            *value = simd.load(&line[at + v * S::LANES..]);
+        }
+        for (total, row) in totals.iter_mut().zip(&rows) {
+            let factor = simd.splat(row[i]);
+            for (total, value) in total.iter_mut().zip(values) {
+                *total = factor.mul_add(value, *total);
+            }
+        }
+    }
+    for (total, line) in totals.iter().zip(out.chunks_exact_mut(out_across)) {
+        for (v, total) in total.iter().enumerate() {
+            total.store(&mut line[to + v * S::LANES..]);
+        }
+    }
+}
+
+/// Products of all rows of a matrix with each other, over their first `width` columns: whole vectors.
+pub(super) struct RowSquares<'a> {
+    pub rows: &'a [f64],
     pub across: usize,
-    pub right: &'a [f64],
     pub width: usize,
     pub out: &'a mut [f64],
 }
 
-impl Kernel for RowProducts<'_> {
+impl Kernel for RowSquares<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let count = self.right.len() / self.width;
-        for (left, out) in self.left.chunks_exact(self.across).zip(self.out.chunks_exact_mut(count)) {
-            for (right, out) in self.right.chunks_exact(self.width).zip(out) {
+        let Self { rows, across, width, out } = self;
+        let count = rows.len() / across;
+        for (i, row) in rows.chunks_exact(across).enumerate() {
+            for (j, other) in rows.chunks_exact(across).enumerate().take(i + 1) {
                 let mut total = simd.splat(0.0);
-                for at in (0..self.width).step_by(S::LANES) {
-                    total = simd.load(&left[at..]).mul_add(simd.load(&right[at..]), total);
+                for at in (0..width).step_by(S::LANES) {
+                    total = simd.load(&row[at..]).mul_add(simd.load(&other[at..]), total);
                 }
-                *out = total.sum();
+                let total = total.sum();
+                out[i * count + j] = total;
+                out[j * count + i] = total;
             }
         }
     }

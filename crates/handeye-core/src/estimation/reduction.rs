@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, Vector6};
 use super::assembly::{in_one, square};
 use super::mixed::{Mixed, Station, add, covariances};
 use super::products::{Accumulate, Product, TOGETHER};
+use super::recurring::squared;
 use crate::simd::dispatch;
 
 /// Components of a twist.
@@ -19,7 +20,7 @@ impl Mixed {
     /// The same likelihood of all levels, of six rows at most where measurements are of pictures; `None` where a
     /// covariance of pixels is singular.
     pub fn reduced(mut self) -> Option<Self> {
-        let n = self.size;
+        let n = self.told;
         let mut free = Vec::new();
         for k in 0..self.stations.len() {
             let station = &self.stations[k];
@@ -39,7 +40,6 @@ impl Mixed {
                 width: station.size,
                 matrix: &station.rows,
                 across: self.width,
-                triangular: 0,
                 out: &mut rows,
             };
             dispatch(self.unit, product);
@@ -58,7 +58,8 @@ impl Mixed {
                 reduced: true,
             };
             for prior in self.priors.iter_mut().filter(|p| p.recurring) {
-                prior.squares[k] = square(&station.columns(prior, self.width));
+                let columns = station.columns(prior, self.width);
+                prior.squares[k] = square(&columns) * squared(&prior.functions[k]);
             }
             self.stations[k] = station;
         }
@@ -66,8 +67,10 @@ impl Mixed {
             self.covariances = covariances(&self.stations, &self.noises, &self.priors);
         }
         let mut sum = vec![0.0; (n + 1).next_multiple_of(TOGETHER) * self.width];
-        dispatch(self.unit, Accumulate::pairs(&free, self.width, n + 1, &mut sum));
+        // What recurs is of the arm and not in them.
+        dispatch(self.unit, Accumulate::pairs(&free, self.width, self.lead, n + 1, &mut sum));
         for (i, row) in sum.chunks_exact(self.width).enumerate().take(n) {
+            let row = &row[self.lead..];
             self.given_right[i] -= row[n];
             for (j, value) in row[..n].iter().enumerate().skip(i) {
                 self.settled.information[(i, j)] = *value;
@@ -76,7 +79,7 @@ impl Mixed {
         }
         self.given += &self.settled.information;
         self.settled.rows = free.len() / self.width;
-        self.settled.constant += sum[n * self.width + n];
+        self.settled.constant += sum[n * self.width + self.lead + n];
         Some(self)
     }
 
@@ -87,13 +90,13 @@ impl Mixed {
             if !station.reduced {
                 return None;
             }
-            let rows = station.rows.chunks_exact(self.width);
+            let rows = station.rows.chunks_exact(self.width).map(|row| &row[self.lead..]);
             let shown = match found {
-                None => DVector::from_iterator(TWIST, rows.map(|row| row[self.size])),
+                None => DVector::from_iterator(TWIST, rows.map(|row| row[self.told])),
                 Some((t, theta)) => {
-                    let arm = self.arm_covariance(k, t, theta.len());
+                    let arm = self.arm_covariance(k, t);
                     let left = |row: &[f64]| -> f64 {
-                        row[self.size] + row.iter().zip(theta.iter()).map(|(b, x)| b * x).sum::<f64>()
+                        row[self.told] + row.iter().zip(theta.iter()).map(|(b, x)| b * x).sum::<f64>()
                     };
                     let left = DVector::from_iterator(TWIST, rows.map(left));
                     &arm * (&arm + &station.pixels).cholesky()?.solve(&left)
@@ -105,13 +108,13 @@ impl Mixed {
         self.stations.iter().enumerate().map(|of| twist(of).unwrap_or_default()).collect()
     }
 
-    /// Covariance of what the arm does new at a station, parameters from `told` on included.
-    fn arm_covariance(&self, k: usize, t: &DVector<f64>, told: usize) -> DMatrix<f64> {
+    /// Covariance of what the arm does new at a station, what recurs included.
+    fn arm_covariance(&self, k: usize, t: &DVector<f64>) -> DMatrix<f64> {
         let mut arm = DMatrix::zeros(TWIST, TWIST);
         for x in &self.noises {
             add(&mut arm, Self::deviation(&x.levels, t).powi(2), &x.squares[k]);
         }
-        for p in self.priors.iter().filter(|p| p.first >= told) {
+        for p in self.priors.iter().filter(|p| p.recurring) {
             add(&mut arm, Self::deviation(&p.levels, t).powi(2), &p.squares[k]);
         }
         arm

@@ -1,72 +1,66 @@
 //! The answer where errors come again that no residual shows.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::mixed::{Evaluation, Mixed};
+use super::normal_equations::Sums;
 use super::products::{Accumulate, TOGETHER};
-use super::station_covariances::{Between, StationFactors};
+use super::recurring::{FUNCTIONS, squared};
 use crate::positive::Factor;
 use crate::simd::{MAX_LANES, dispatch};
 
 impl Mixed {
     /// The answer as if recurring errors were new at every station, with its covariance under the model as it is: the
-    /// sandwich of a working model (Huber 1967, White 1980). Given are the factors of the stations' covariances without
-    /// what recurs.
+    /// sandwich of a working model (Huber 1967, White 1980). Given are deviations of noises and priors, and information and
+    /// right side without the stations.
     pub(super) fn answer_apart(
         &self,
-        alone: &StationFactors,
-        noise: &[f64],
-        prior: &[f64],
+        (noise, prior): (&[f64], &[f64]),
+        (mut information, mut right): (DMatrix<f64>, DVector<f64>),
         evaluation: &mut Evaluation,
     ) -> Option<()> {
-        let p = self.told;
-        let mut information = self.given.view((0, 0), (p, p)).into_owned();
-        let mut right = self.given_right.rows(0, p).into_owned();
-        for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| !q.recurring) {
-            Self::add_prior(q, *s, &mut information, &mut right);
-        }
-        let recurring = self.size - p;
-        let mut scales = vec![0.0; recurring];
-        for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| q.recurring) {
-            scales[q.first - p..q.first - p + q.count].fill(*s);
-        }
-        let n = self.size;
+        let (p, width) = (self.told, self.width);
         let (whitened, _) = self.whitened(noise, Some(prior))?;
         let rows = &whitened.rows[..];
-        let mut sum = vec![0.0; p.next_multiple_of(TOGETHER) * self.width];
-        dispatch(self.unit, Accumulate::pairs(rows, self.width, p, &mut sum));
-        let shared = DMatrix::from_fn(p, recurring, |i, j| sum[i * self.width + p + j] * scales[j]);
-        // Without what recurs the rows are less than of unit noise: what is between them then.
         let narrow = p.next_multiple_of(MAX_LANES);
-        let mut left = vec![0.0; self.rows() * narrow];
-        let between = Between {
-            factors: &whitened.factors,
-            others: alone,
-            sizes: &self.covariances.sizes,
-            rows,
-            width: self.width,
-            narrow,
-            out: &mut left,
-        };
-        dispatch(self.unit, between);
-        let mut own = vec![0.0; p.next_multiple_of(TOGETHER) * narrow];
-        dispatch(self.unit, Accumulate::pairs(&left, narrow, p, &mut own));
-        for i in 0..p {
-            right[i] -= sum[i * self.width + n];
-            for j in i..p {
-                let value = sum[i * self.width + j];
-                information[(i, j)] += value;
-                if i != j {
-                    information[(j, i)] += value;
+        let mut products = self.each_station(rows, (rows, width), self.lead, false);
+        let mut shared = vec![0.0; FUNCTIONS * self.twists * narrow];
+        let sums = Sums { rows: &mut shared, width: narrow, to: 0 };
+        self.over_stations(&products, width, self.lead..self.lead + p, false, sums);
+        for (q, s) in self.priors.iter().zip(prior).filter(|(q, _)| q.recurring) {
+            let lines = FUNCTIONS * q.first * narrow..FUNCTIONS * (q.first + q.count) * narrow;
+            for entry in &mut shared[lines] {
+                *entry *= s;
+            }
+            for (of_station, f) in products.chunks_exact_mut(self.twists * width).zip(&q.functions) {
+                let size = s * squared(f).sqrt();
+                let lines = &mut of_station[q.first * width..(q.first + q.count) * width];
+                for entry in lines {
+                    *entry *= size;
                 }
             }
         }
+        // What recurs is the same at all stations, and not new at each.
+        let mut once = vec![0.0; p.next_multiple_of(TOGETHER) * narrow];
+        dispatch(self.unit, Accumulate::pairs(&shared, narrow, 0, p, &mut once));
+        let mut again = vec![0.0; p.next_multiple_of(TOGETHER) * width];
+        dispatch(self.unit, Accumulate::pairs(&products, width, self.lead, p, &mut again));
+        let sum = self.sum_told(rows);
+        for i in 0..p {
+            let row = &sum[i * width + self.lead..];
+            right[i] -= row[p];
+            for j in i..p {
+                information[(i, j)] += row[j];
+                information[(j, i)] = information[(i, j)];
+            }
+        }
+        let meat = DMatrix::from_fn(p, p, |i, j| {
+            let (first, last) = (i.min(j), i.max(j));
+            information[(i, j)] + once[first * narrow + last] - again[first * width + self.lead + last]
+        });
         let bread = Factor::new(&information)?.inverse();
-        let theta = &bread * right;
-        let recurs = |i: usize, j: usize| own[i * narrow + j] - sum[i * self.width + j];
-        let meat = &shared * shared.transpose() + DMatrix::from_fn(p, p, |i, j| recurs(i.min(j), i.max(j)));
-        evaluation.covariance = &bread + &bread * meat * &bread;
-        evaluation.theta = theta;
+        evaluation.covariance = &bread * meat * &bread;
+        evaluation.theta = bread * right;
         evaluation.information = information;
         Some(())
     }

@@ -90,9 +90,16 @@ pub(super) struct StationFactors {
 }
 
 impl StationFactors {
+    /// The triangle of a station, row by row in rows of `size`.
     #[inline(always)]
-    fn entry(&self, k: usize, i: usize, j: usize) -> f64 {
-        self.entries[packed(i, j) * self.across + k]
+    fn copy(&self, k: usize, size: usize, triangle: &mut Vec<f64>) {
+        triangle.clear();
+        triangle.resize(size * size, 0.0);
+        for (i, row) in triangle.chunks_exact_mut(size.max(1)).enumerate() {
+            for (j, entry) in row[..=i].iter_mut().enumerate() {
+                *entry = self.entries[packed(i, j) * self.across + k];
+            }
+        }
     }
 }
 
@@ -159,69 +166,57 @@ impl Kernel for Whiten<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Self { factors, rows, width, mut out } = self;
+        let mut triangle = Vec::new();
         for (k, from) in rows.iter().enumerate() {
             let (to, rest) = out.split_at_mut(from.len());
             out = rest;
-            for i in 0..from.len() / width {
-                let (done, row) = to.split_at_mut(i * width);
-                let inverse = simd.splat(factors.entry(k, i, i));
-                for at in (0..width).step_by(S::LANES) {
-                    let mut value = simd.load(&from[i * width + at..]);
-                    for j in 0..i {
-                        let factor = simd.splat(factors.entry(k, i, j));
-                        value = factor.neg_mul_add(simd.load(&done[j * width + at..]), value);
-                    }
-                    (value * inverse).store(&mut row[at..]);
-                }
+            let size = from.len() / width;
+            factors.copy(k, size, &mut triangle);
+            match size {
+                3 => whiten_few::<S, 3>(simd, &triangle, from, width, to),
+                6 => whiten_few::<S, 6>(simd, &triangle, from, width, to),
+                _ => whiten_many(simd, &triangle, from, width, to),
             }
         }
     }
 }
 
-/// `N' L^-T` times rows of all stations that `L` has whitened, where `N` are factors of other covariances: products of
-/// what this gives are those of the rows with `L^-1 N N' L^-T` between them.
-pub(super) struct Between<'a> {
-    pub factors: &'a StationFactors,
-    pub others: &'a StationFactors,
-    /// Rows of each station.
-    pub sizes: &'a [usize],
-    pub rows: &'a [f64],
-    pub width: usize,
-    /// Columns that are wanted, in whole vectors.
-    pub narrow: usize,
-    pub out: &'a mut [f64],
+/// Rows of a touch or of one picture, kept in registers.
+#[inline(always)]
+fn whiten_few<S: Simd, const ROWS: usize>(
+    simd: S,
+    triangle: &[f64],
+    from: &[f64],
+    width: usize,
+    to: &mut [f64],
+) {
+    for at in (0..width).step_by(S::LANES) {
+        let mut values = [simd.splat(0.0); ROWS];
+        for i in 0..ROWS {
+            let mut value = simd.load(&from[i * width + at..]);
+            for j in 0..i {
+                value = simd.splat(triangle[i * ROWS + j]).neg_mul_add(values[j], value);
+            }
+            values[i] = value * simd.splat(triangle[i * ROWS + i]);
+            values[i].store(&mut to[i * width + at..]);
+        }
+    }
 }
 
-impl Kernel for Between<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        let Self { factors, others, sizes, rows, width, narrow, out } = self;
-        let mut first = 0;
-        for (k, size) in sizes.iter().copied().enumerate() {
-            let from = &rows[first * width..];
-            let to = &mut out[first * narrow..(first + size) * narrow];
-            first += size;
-            for at in (0..narrow).step_by(S::LANES) {
-                for i in (0..size).rev() {
-                    let mut value = simd.load(&from[i * width + at..]);
-                    for q in i + 1..size {
-                        let factor = simd.splat(factors.entry(k, q, i));
-                        value = factor.neg_mul_add(simd.load(&to[q * narrow + at..]), value);
-                    }
-                    (value * simd.splat(factors.entry(k, i, i))).store(&mut to[i * narrow + at..]);
-                }
-                for i in 0..size {
-                    let mut value =
-                        simd.load(&to[i * narrow + at..]) * simd.splat(1.0 / others.entry(k, i, i));
-                    for q in i + 1..size {
-                        let factor = simd.splat(others.entry(k, q, i));
-                        value = factor.mul_add(simd.load(&to[q * narrow + at..]), value);
-                    }
-                    value.store(&mut to[i * narrow + at..]);
-                }
+/// Rows of several measurements.
+#[inline(always)]
+fn whiten_many<S: Simd>(simd: S, triangle: &[f64], from: &[f64], width: usize, to: &mut [f64]) {
+    let size = from.len() / width;
+    let lines = from.chunks_exact(width).zip(triangle.chunks_exact(size.max(1)));
+    for (i, (from, factors)) in lines.enumerate() {
+        let (done, row) = to.split_at_mut(i * width);
+        let inverse = simd.splat(factors[i]);
+        for at in (0..width).step_by(S::LANES) {
+            let mut value = simd.load(&from[at..]);
+            for (done, factor) in done.chunks_exact(width).zip(factors) {
+                value = simd.splat(*factor).neg_mul_add(simd.load(&done[at..]), value);
             }
+            (value * inverse).store(&mut row[at..]);
         }
     }
 }

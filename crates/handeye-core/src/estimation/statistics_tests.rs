@@ -8,7 +8,8 @@ use super::degrees_of_freedom::degrees_of_freedom;
 use super::linearisation::Guess;
 use super::mixed::{Mixed, Prior, Wanted};
 use super::posterior::assemble;
-use super::tests::{Truth, made, options};
+use super::recurring::FUNCTIONS;
+use super::tests::{Truth, made, mixed_of, options};
 use super::*;
 use crate::se3::Se3;
 
@@ -31,6 +32,7 @@ fn an_inflated_prior_is_a_wider_density() {
             information: Some(m.clone()),
             mean: Some(mean.clone()),
             recurring: false,
+            functions: vec![],
             squares: vec![],
         };
         let (mut information, mut right) = (DMatrix::zeros(4, 4), DVector::zeros(4));
@@ -147,4 +149,72 @@ fn a_station_that_took_part_is_expected_as_by_the_others_alone() {
     };
     assert!(median(off).abs() < 0.06);
     assert!(median(chain).abs() < 0.06);
+}
+
+/// Sum of a matrix per station, each in its own rows of all; of `same` all products of two stations too.
+fn in_all(parts: &[DMatrix<f64>], same: bool) -> DMatrix<f64> {
+    let mut all =
+        DMatrix::zeros(parts.iter().map(DMatrix::nrows).sum(), parts.iter().map(DMatrix::nrows).sum());
+    let mut first = 0;
+    for part in parts {
+        let mut next = if same { 0 } else { first };
+        for other in if same { parts } else { std::slice::from_ref(part) } {
+            let product = part * other.transpose();
+            all.view_mut((first, next), product.shape()).copy_from(&product);
+            next += other.nrows();
+        }
+        first += part.nrows();
+    }
+    all
+}
+
+#[test]
+fn what_recurs_is_as_its_covariance_written_out() {
+    let truth = one_camera(9, 9, 1e-3);
+    let mixed = mixed_of(&truth, false);
+    let t = mixed.start().map(|t| t + 0.3 * t.sin());
+    let deviation = |levels: &[usize]| levels.iter().map(|l| t[*l]).sum::<f64>().exp();
+    let roots: Vec<_> = mixed.stations.iter().map(|s| s.pixels.clone().cholesky().unwrap().l()).collect();
+    // Of the stations alone, as it is, and as if all were new at every station.
+    let mut alone = in_all(&roots, false);
+    for x in &mixed.noises {
+        alone += in_all(&x.roots, false) * deviation(&x.levels).powi(2);
+    }
+    let (mut truly, mut working) = (alone.clone(), alone);
+    for p in mixed.priors.iter().filter(|p| p.recurring) {
+        let columns: Vec<_> = mixed.stations.iter().map(|s| s.columns(p, mixed.width)).collect();
+        for i in 0..FUNCTIONS {
+            let of = columns.iter().zip(&p.functions).map(|(m, f)| m * f[i]).collect::<Vec<_>>();
+            truly += in_all(&of, true) * deviation(&p.levels).powi(2);
+            working += in_all(&of, false) * deviation(&p.levels).powi(2);
+        }
+    }
+    let (told, width) = (mixed.told, mixed.width);
+    let rows = mixed.stations.iter().flat_map(|s| s.rows.chunks_exact(width)).map(|row| &row[mixed.lead..]);
+    let rows: Vec<&[f64]> = rows.collect();
+    let b = DMatrix::from_fn(rows.len(), told, |i, j| rows[i][j]);
+    let e = DVector::from_fn(rows.len(), |i, _| rows[i][told]);
+    let fit = |covariance: &DMatrix<f64>| {
+        let inverse = covariance.clone().try_inverse().unwrap();
+        let information = &mixed.given + b.transpose() * &inverse * &b;
+        let right = &mixed.given_right - b.transpose() * &inverse * &e;
+        (inverse, information, right)
+    };
+    let logarithm = |m: &DMatrix<f64>| 2.0 * m.clone().cholesky().unwrap().l().diagonal().map(f64::ln).sum();
+    let (inverse, information, right) = fit(&truly);
+    let theta = information.clone().try_inverse().unwrap() * &right;
+    let penalty: f64 = mixed.levels.iter().zip(t.iter()).map(|(l, t)| l.penalty(*t).0).sum();
+    let twice = logarithm(&truly) + e.dot(&(inverse * &e)) + logarithm(&information) - right.dot(&theta);
+    let found = mixed.evaluate(&t, Wanted::Slope).unwrap();
+    assert!((found.value - 0.5 * twice - penalty).abs() < 1e-7 * twice.abs(), "{} {twice}", found.value);
+    assert!((&found.theta - &theta).amax() < 1e-7 * theta.amax());
+    // The answer as if all were new, its covariance as all is.
+    let (weight, information, right) = fit(&working);
+    let bread = information.clone().try_inverse().unwrap();
+    let meat = &mixed.given + b.transpose() * &weight * truly * weight * &b;
+    let covariance = &bread * meat * &bread;
+    let found = mixed.evaluate(&t, Wanted::Answer).unwrap();
+    assert!((&found.theta - &bread * right).amax() < 1e-7 * found.theta.amax());
+    assert!((&found.covariance - &covariance).amax() < 1e-7 * covariance.amax());
+    assert!((&found.information - &information).amax() < 1e-7 * information.amax());
 }

@@ -106,7 +106,7 @@ pub(super) fn options(described: bool) -> Options {
     }
 }
 
-fn mixed_of(truth: &Truth, described: bool) -> Mixed {
+pub(super) fn mixed_of(truth: &Truth, described: bool) -> Mixed {
     let guess = Guess { x: truth.x.clone(), y: truth.y.clone(), away: vec![] };
     let all = components::all(&truth.cell, &assumptions(described)).unwrap();
     let end = truth.cell.columns().end;

@@ -12,6 +12,9 @@ use crate::estimation::cell::Cell;
 use crate::estimation::component::{Effect, Term};
 use crate::estimation::levels::{Level, LevelPrior};
 use crate::estimation::linearisation::{Linearisation, Rows};
+use crate::estimation::recurring::{FUNCTIONS, squared};
+use crate::positive::Block;
+use crate::simd::MAX_LANES;
 
 /// Flange poses further apart than this have little of an error in common; a chord of 2 is half a turn.
 const LIKENESS_M: f64 = 1.0;
@@ -42,11 +45,9 @@ const AT_BASE_UNSEEN: Beliefs = Beliefs { size_deg: 0.08, lever_spread: 1.5, ..A
 /// How surely a rough arm hides errors in proportion to its noise, and the lever of arms as rough: they are small.
 const ROUGH_SPREAD: f64 = 0.4;
 const ROUGH_LEVER_M: f64 = 0.6;
-/// Functions that carry less of the variance than this count as each station's own.
+/// Functions that carry less of the variance than this count as each station's own. So do all but the largest: where
+/// stations have little in common there are as many functions as stations, and each says as little as noise of its own.
 const SMALLEST_FUNCTION: f64 = 1e-4;
-/// So do all but the largest: where stations have little in common there are as many functions as stations, and each
-/// says as little as noise of its own.
-const MOST_FUNCTIONS: usize = 6;
 /// Share of the variance that is always each station's own.
 const OWN_SHARE: f64 = 1e-3;
 
@@ -56,8 +57,8 @@ pub(in crate::estimation) struct Posture {
     beliefs: &'static Beliefs,
     levels: [&'static str; 2],
     rows: fn(&Rows) -> &DMatrix<f64>,
-    /// Value of each function (columns) at each station of the cell (rows).
-    functions: DMatrix<f64>,
+    /// Value of each function at each station of the cell.
+    functions: Vec<Block>,
     /// Root of the share of the variance that is each station's own.
     own: Vec<f64>,
     roughness: f64,
@@ -101,11 +102,15 @@ impl Posture {
         let least = SMALLEST_FUNCTION * count as f64;
         let mut kept: Vec<usize> = (0..count).filter(|i| eigen.eigenvalues[*i] > least.min(0.5)).collect();
         kept.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-        kept.truncate(MOST_FUNCTIONS);
-        let functions = DMatrix::from_fn(count, kept.len(), |k, j| {
-            eigen.eigenvectors[(k, kept[j])] * (eigen.eigenvalues[kept[j]] * (1.0 - OWN_SHARE)).sqrt()
-        });
-        let own = (0..count).map(|k| (1.0 - functions.row(k).norm_squared()).max(OWN_SHARE).sqrt()).collect();
+        kept.truncate(FUNCTIONS);
+        let mut functions = vec![[0.0; MAX_LANES]; count];
+        for (j, of) in kept.into_iter().enumerate() {
+            let size = (eigen.eigenvalues[of] * (1.0 - OWN_SHARE)).sqrt();
+            for (values, entry) in functions.iter_mut().zip(eigen.eigenvectors.column(of).iter()) {
+                values[j] = entry * size;
+            }
+        }
+        let own = functions.iter().map(|values| (1.0 - squared(values)).max(OWN_SHARE).sqrt()).collect();
         Self { name, beliefs, levels, rows, functions, own, roughness }
     }
 }
@@ -157,15 +162,10 @@ impl Component for Posture {
         let mut terms = Vec::new();
         for (first, levels) in [(0, vec![0, 1]), (3, vec![0])] {
             let part = |rows: &Rows| (self.rows)(rows).columns(first, 3).into_owned();
-            let shared = per_station(linearisation, |rows| {
-                let twist = part(rows);
-                let count = self.functions.ncols();
-                DMatrix::from_fn(twist.nrows(), 3 * count, |i, j| {
-                    twist[(i, j % 3)] * self.functions[(rows.station, j / 3)]
-                })
-            });
+            let functions = linearisation.stations.iter().map(|rows| self.functions[rows.station]).collect();
+            let shared = Effect::Recurring { columns: per_station(linearisation, part), functions };
             let own = per_station(linearisation, |rows| part(rows) * self.own[rows.station]);
-            terms.push(Term { levels: levels.clone(), effect: Effect::Recurring(shared) });
+            terms.push(Term { levels: levels.clone(), effect: shared });
             terms.push(Term { levels, effect: Effect::Noise(own) });
         }
         terms
