@@ -9,7 +9,6 @@ import pytest
 from handeye import _core
 from handeye.errors import InputError
 from handeye.estimation import AutoEstimator, AutoOptions, Estimate, Measurements, calibrate
-from handeye.estimation.f_distribution import f_quantile
 from handeye.planning import Pool, rank
 from handeye.planning.prediction import Prediction, Sight
 from handeye.robots import Arm, ArmKinematics, Joint, arm_kinematics, open_arm
@@ -17,6 +16,7 @@ from handeye.simulation.cells import CellOptions, ErrorKind, simulate
 from handeye.types import Mounting, Pose, Recording, View
 from handeye.types.arrays import FloatArray
 from handeye.types.calibration import RobotSide
+from handeye.validation.metrics import region_holds
 
 ARM = open_arm("ur5e")
 KNOWN = ArmKinematics(ARM)
@@ -115,7 +115,7 @@ def test_regions_hold_the_truth(kind: ErrorKind, mounting: Mounting) -> None:
         deviation = error(recording, estimate)
         distance = float(deviation @ np.linalg.solve(estimate.hand_eye_covariance, deviation))
         nees += distance / (6 * trials)
-        inside += distance < 6 * f_quantile(0.95, 6, estimate.degrees_of_freedom)
+        inside += region_holds(distance, estimate.degrees_of_freedom)
     assert 0.6 < nees < 1.3
     assert inside >= 52
 

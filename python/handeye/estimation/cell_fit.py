@@ -26,7 +26,7 @@ from handeye.types.probing import Probing, Tip
 from handeye.types.rig import Body
 
 # Pairs of nodes that the answer is averaged over.
-NODE_PAIRS = 16
+NODE_PAIRS = 24
 MOST_LINEARISATIONS = 8
 # A mirrored pose is looked at where it fits less than this many times worse than the best.
 MIRROR_RATIO = 8.0

@@ -17,7 +17,6 @@ from handeye.compute.parallel import Progress, Workers, run_all
 from handeye.errors import SolveError
 from handeye.estimation import Estimate, Measurements
 from handeye.estimation.auto import AutoEstimator, AutoOptions
-from handeye.estimation.f_distribution import f_cumulative
 from handeye.planning.prospect import MANY_VIEWS, OutOfReach
 from handeye.planning.stopping import State, Stop
 from handeye.robots import Arm, ArmKinematics, Joint
@@ -25,6 +24,7 @@ from handeye.robots.displaced import displaced, random_displacements
 from handeye.simulation.mixed_arm import log_uniform, random_twist
 from handeye.types import Camera, Chessboard, Mounting, Pose, View
 from handeye.types.units import MM_PER_M
+from handeye.validation import metrics
 
 BOARD = Chessboard(5, 7, 0.02)
 SIZE_PX = (1280, 720)
@@ -134,7 +134,7 @@ def _one(job: _Job) -> CheapCell:
     refused_at, forecast = _refusal(estimator, measurements)
     reached = estimator(measurements).within_95.translation_mm if refused_at else 0.0
     return CheapCell(
-        f_cumulative(squared / 6, 6, estimate.degrees_of_freedom) <= 0.95,
+        metrics.region_holds(squared, estimate.degrees_of_freedom),
         off <= estimate.within_95.translation_mm,
         off,
         estimate.within_95.translation_mm,

@@ -15,7 +15,6 @@ from handeye.compute.parallel import Progress, Workers, run_all
 from handeye.errors import SolveError
 from handeye.estimation import Estimate, Measurements, make_estimator
 from handeye.estimation.difference import UNLIKELY, difference
-from handeye.estimation.f_distribution import f_cumulative
 from handeye.estimation.probing import verify
 from handeye.robots import ArmKinematics
 from handeye.simulation.cells import (
@@ -32,6 +31,7 @@ from handeye.types.calibration import ModelName
 from handeye.types.pose import inverses
 from handeye.types.probing import UNKNOWN_M, Probing, Tip, Touch
 from handeye.types.rig import Body
+from handeye.validation import metrics
 
 # How well a person meets a corner, and knows the tip of the tool.
 TOUCH_SIGMA_M, TOOL_SIGMA_M = 1e-4, 3e-4
@@ -133,7 +133,7 @@ def _one(job: _Job) -> ProbedCell:
 def _holds(estimate: Estimate, X: Pose) -> bool:
     xi = (estimate.X @ X.inverse()).log()
     squared = float(xi @ np.linalg.solve(estimate.hand_eye_covariance, xi))
-    return f_cumulative(squared / 6, 6, estimate.degrees_of_freedom) <= 0.95
+    return metrics.region_holds(squared, estimate.degrees_of_freedom)
 
 
 def touch_corners(random: np.random.Generator, cell: SimulatedCell, points: FloatArray) -> Probing:

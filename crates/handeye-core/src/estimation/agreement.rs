@@ -11,7 +11,7 @@ use super::cell::Cell;
 use super::components;
 use super::linearisation::Guess;
 use super::mixed::{Mixed, Wanted};
-use super::nodes;
+use super::nodes::{Axes, LEAST_CURVATURE};
 use super::posterior::{assemble, find_mode, singular};
 use super::weak_prior::WeakPrior;
 use crate::error::Error;
@@ -19,8 +19,6 @@ use crate::se3::Se3;
 
 /// Squared distances beyond this have a probability of zero.
 const FARTHEST: f64 = 1400.0;
-/// Curvature that is believed of a level at least, as where it is averaged over.
-const LEAST_CURVATURE: f64 = 0.25;
 
 /// Of so few members each is predicted from the others fitted again; of more it is taken out of the answer.
 const FEW: usize = 5;
@@ -108,7 +106,7 @@ impl Agreement {
         };
         let mode = find_mode(&set, start)?;
         let mut nodes = Vec::with_capacity(2 * pairs + 1);
-        for (t, density) in nodes::around(&mode.t, &mode.curvature, pairs) {
+        for (t, density) in Axes::of(&mode.t, &mode.curvature).points(pairs) {
             // Levels at which the model is singular have no share.
             let Some(at) = set.evaluate(&t, Wanted::Answer) else { continue };
             let log_weight = mode.value - at.value - density;

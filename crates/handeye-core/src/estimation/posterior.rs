@@ -8,7 +8,7 @@ use super::components::{self, Assumptions};
 use super::degrees_of_freedom::degrees_of_freedom;
 use super::linearisation::{Guess, linearise};
 use super::mixed::{Evaluation, Mixed, Wanted};
-use super::nodes;
+use super::nodes::Axes;
 use super::weak_prior::WeakPrior;
 use crate::error::Error;
 use crate::interrupt;
@@ -305,7 +305,10 @@ fn damped_step(now: &Evaluation, damping: f64, held: &[usize]) -> DVector<f64> {
 
 /// The nodes with their shares, the mode first.
 fn average(mixed: &Mixed, mode: &Mode, at_mode: &Evaluation, pairs: usize) -> Vec<Node> {
-    let points = nodes::around(&mode.t, &mode.curvature, pairs);
+    let fall = |t: &DVector<f64>| {
+        mixed.evaluate(t, Wanted::Value).map_or(f64::INFINITY, |there| there.value - mode.value)
+    };
+    let points = Axes::of(&mode.t, &mode.curvature).measured(fall).points(pairs);
     // Levels at which the model is singular have no share.
     let node = |t: &DVector<f64>, density: f64, answer: &Evaluation| Node {
         weight: mode.value - answer.value - density,
@@ -321,7 +324,7 @@ fn average(mixed: &Mixed, mode: &Mode, at_mode: &Evaluation, pairs: usize) -> Ve
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let around = &points[1..];
     let (own, others) = around.split_at(around.len().div_ceil(threads));
-    let mut nodes = vec![node(&mode.t, 0.0, at_mode)];
+    let mut nodes = vec![node(&mode.t, points[0].1, at_mode)];
     std::thread::scope(|scope| {
         let others: Vec<_> =
             others.chunks(own.len().max(1)).map(|points| scope.spawn(|| at(points))).collect();

@@ -40,7 +40,7 @@ impl Component for RobotPose {
                 start: 0.004 * degree,
                 prior: LevelPrior::Deviation {
                     size: 0.02 * degree,
-                    exponent: 0.02,
+                    exponent: 0.0,
                     tail: 1.0,
                     nothing: 1e-6 * degree,
                 },
