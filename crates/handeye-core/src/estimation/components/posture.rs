@@ -34,7 +34,7 @@ struct Beliefs {
 
 /// Wrists are short, and what they hide is small.
 const AT_FLANGE: Beliefs =
-    Beliefs { same_everywhere: 0.5, size_deg: 0.02, exponent: 0.26, lever_m: 0.4, lever_spread: 0.7 };
+    Beliefs { same_everywhere: 0.5, size_deg: 0.011, exponent: 0.26, lever_m: 0.4, lever_spread: 0.7 };
 /// Shoulders and mountings carry the whole reach.
 const AT_BASE: Beliefs =
     Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.6, lever_m: 1.0, lever_spread: 0.7 };
