@@ -53,6 +53,13 @@ def nearest_rigid(T: ArrayLike) -> NDArray[float64]:
     True
     """
 
+def are_rigid(T: ArrayLike, tolerance: float) -> NDArray[bool_]:
+    """Whether matrices (N, 4, 4) are rigid as they stand, rotations orthogonal to the tolerance (N,).
+
+    >>> _core.are_rigid([np.eye(4), 2 * np.eye(4)], 1e-12).tolist()
+    [True, False]
+    """
+
 # Cameras
 
 def lenses() -> list[tuple[str, list[str]]]:
@@ -454,6 +461,15 @@ class Solution:
     @property
     def is_converged(self) -> bool:
         """Whether it came to rest at a minimum."""
+
+def log_densities(deviations: ArrayLike, covariances: ArrayLike, variances: ArrayLike) -> NDArray[float64]:
+    """Logarithms (K, M) of the densities of twists (K, 6), Gaussian about zero.
+
+    Of each under its covariance (K, 6, 6) with each of M sets of variances (K, M, 6) beside it.
+
+    >>> _core.log_densities(np.zeros((1, 6)), np.eye(6)[np.newaxis], np.zeros((1, 2, 6))).round(3).tolist()
+    [[-5.514, -5.514]]
+    """
 
 class Agreement:
     """Views of one target through one camera, linearised at X and Y (4, 4), to be fitted in sets.

@@ -111,18 +111,19 @@ fn homography_pose(features: &[Feature], rays: &[Vector2<f64>]) -> Result<Se3, E
     let plane = features.iter().map(|f| Vector2::new(f.position.x, f.position.y));
     let from = normalising(plane.clone()).ok_or_else(on_line)?;
     let to = normalising(rays.iter().copied()).ok_or_else(on_line)?;
-    let mut normal = SMatrix::<f64, 9, 9>::zeros();
+    // Of rows [p', 0, -u p'] and [0, p', -v p'] the sums of p p', and of that times u, v and u^2 + v^2.
+    let mut sums = [Matrix3::zeros(); 4];
     for (p, u) in plane.zip(rays) {
         let p = from * Vector3::new(p.x, p.y, 1.0);
         let u = to * Vector3::new(u.x, u.y, 1.0);
-        let mut rows = SMatrix::<f64, 2, 9>::zeros();
-        for i in 0..3 {
-            rows[(0, i)] = p[i];
-            rows[(0, 6 + i)] = -u.x * p[i];
-            rows[(1, 3 + i)] = p[i];
-            rows[(1, 6 + i)] = -u.y * p[i];
+        let outer = p * p.transpose();
+        for (sum, factor) in sums.iter_mut().zip([1.0, -u.x, -u.y, u.x * u.x + u.y * u.y]) {
+            *sum += outer * factor;
         }
-        normal += rows.transpose() * rows;
+    }
+    let mut normal = SMatrix::<f64, 9, 9>::zeros();
+    for (i, j, which) in [(0, 0, 0), (3, 3, 0), (0, 6, 1), (6, 0, 1), (3, 6, 2), (6, 3, 2), (6, 6, 3)] {
+        normal.fixed_view_mut::<3, 3>(i, j).copy_from(&sums[which]);
     }
     let eigen = DMatrix::from_column_slice(9, 9, normal.as_slice()).symmetric_eigen();
     let mut order: Vec<usize> = (0..9).collect();

@@ -169,6 +169,17 @@ impl Se3 {
         Ok(Self::new(rotation, translation))
     }
 
+    /// Whether the 16 entries of a matrix, row by row, are a rigid transform as they stand: last row exact, rotation
+    /// orthogonal to `tolerance`, not mirrored.
+    pub fn is_rigid(entries: &[f64; 16], tolerance: f64) -> bool {
+        let m = entries;
+        let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
+        let off = rotation.transpose() * rotation - Matrix3::identity();
+        m[12..] == [0.0, 0.0, 0.0, 1.0]
+            && off.iter().all(|x| x.abs() <= tolerance)
+            && rotation.determinant() > 0.0
+    }
+
     /// The homogeneous 4 x 4 matrix.
     pub fn to_matrix(&self) -> Matrix4<f64> {
         let mut m = Matrix4::identity();

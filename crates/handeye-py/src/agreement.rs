@@ -1,6 +1,7 @@
 //! How well views agree, as a Python value.
 
-use handeye_core::estimation::{Agreement as CoreAgreement, Cell, Measurement, Station};
+use handeye_core::estimation::{Agreement as CoreAgreement, Cell, Measurement, Station, log_densities};
+use nalgebra::Vector6;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
@@ -11,7 +12,8 @@ use crate::estimation::{CameraGiven, PoseMeasurements, body, seen_by};
 
 /// Registers the class of this file.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Agreement>()
+    module.add_class::<Agreement>()?;
+    module.add_function(wrap_pyfunction!(log_densities_py, module)?)
 }
 
 type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -128,4 +130,34 @@ impl Agreement {
             fit.predictions.iter().map(|p| p.p_value).collect(),
         ))
     }
+}
+
+/// Logarithms of densities; see the type stub.
+#[pyfunction]
+#[pyo3(name = "log_densities")]
+fn log_densities_py<'py>(
+    py: Python<'py>,
+    deviations: Array<'py>,
+    covariances: Array<'py>,
+    variances: Array<'py>,
+) -> PyResult<Floats<'py>> {
+    let deviations = convert::vectors::<6>(py, "deviations", &deviations)?;
+    let covariances = convert::matrices::<6, 6>(py, "covariances", &covariances)?;
+    let count = deviations.len();
+    let [views, each, 6] = *variances.shape() else {
+        return Err(invalid(py, "variances must have shape (K, M, 6)"));
+    };
+    if covariances.len() != count || views != count {
+        return Err(invalid(py, "as many covariances and sets of variances as deviations are needed"));
+    }
+    let entries = convert::in_place(&variances);
+    let variances: Vec<_> = entries.chunks_exact(6).map(Vector6::from_column_slice).collect();
+    let found = py.core(|| {
+        let mut found = Vec::with_capacity(count * each);
+        for (k, (deviation, covariance)) in deviations.iter().zip(&covariances).enumerate() {
+            found.extend(log_densities(deviation, covariance, &variances[k * each..(k + 1) * each])?);
+        }
+        Ok(found)
+    })?;
+    Ok(convert::array(py, &[count, each], found.map_err(|e| to_python(py, e))?))
 }

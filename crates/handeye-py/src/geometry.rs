@@ -3,7 +3,7 @@
 use crate::call::CallCore;
 use handeye_core::interrupt::checked;
 use handeye_core::se3::Se3;
-use numpy::PyArrayDyn;
+use numpy::{IntoPyArray, PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::convert::{self, Array};
@@ -13,7 +13,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(se3_exp, module)?)?;
     module.add_function(wrap_pyfunction!(se3_log, module)?)?;
     module.add_function(wrap_pyfunction!(se3_adjoint, module)?)?;
-    module.add_function(wrap_pyfunction!(nearest_rigid, module)?)
+    module.add_function(wrap_pyfunction!(nearest_rigid, module)?)?;
+    module.add_function(wrap_pyfunction!(are_rigid, module)?)
 }
 
 #[pyfunction]
@@ -44,4 +45,12 @@ fn se3_adjoint<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArr
 fn nearest_rigid<'py>(py: Python<'py>, T: Array<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let transform = convert::transform(py, "T", &T)?;
     Ok(convert::matrix_out(py, &transform.to_matrix()))
+}
+
+#[pyfunction]
+#[expect(non_snake_case, reason = "the name in Python")]
+fn are_rigid<'py>(py: Python<'py>, T: Array<'py>, tolerance: f64) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    let entries = convert::row_major::<4, 4>(py, "T", &T)?;
+    let (each, _) = entries.as_chunks::<16>();
+    Ok(each.iter().map(|m| Se3::is_rigid(m, tolerance)).collect::<Vec<_>>().into_pyarray(py))
 }

@@ -18,6 +18,7 @@ from handeye.types.target import Target
 from handeye.types.view import View
 
 MIN_POINTS = 4
+_OF_VIEWS = {"flange_poses", "motions", "joints", "point_counts"}
 _NO_IDS, _NO_PIXELS = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
 
 
@@ -75,6 +76,16 @@ def view_pose(camera: Camera, target: Target, view: View) -> ViewPose:
     >>> view_pose(camera, board, recording.views[0]).rmse_px < 1.0
     True
     """
+    return _view_poses([_found(camera, target, view)])[0]
+
+
+# Pose, root mean square and information.
+_Fit = tuple[FloatArray, float, FloatArray]
+# The better of two minima, and the other if there is one.
+_Found = tuple[_Fit, _Fit | None]
+
+
+def _found(camera: Camera, target: Target, view: View) -> _Found:
     if len(view) < MIN_POINTS:
         raise InputError(
             f"view {view.name}: {len(view)} points, at least {MIN_POINTS} are needed",
@@ -84,12 +95,18 @@ def view_pose(camera: Camera, target: Target, view: View) -> ViewPose:
     points = target.points[view.point_ids]
     radii = target.radii_m[view.point_ids]
     try:
-        best, mirrored = _core.planar_pose(camera.lens, camera.parameters, points, radii, view.pixels)
+        return _core.planar_pose(camera.lens, camera.parameters, points, radii, view.pixels)
     except HandeyeError as error:
         raise type(error)(f"view {view.name}: {error}", code=error.code, hint=error.hint) from error
-    return ViewPose(
-        Pose(best[0]), best[1], best[2], None if mirrored is None else (Pose(mirrored[0]), mirrored[1])
-    )
+
+
+def _view_poses(found: Sequence[_Found]) -> list[ViewPose]:
+    matrices = [fit[0] for fits in found for fit in fits if fit is not None]
+    poses = iter(Pose.of_matrices(np.array(matrices).reshape(-1, 4, 4)))
+    return [
+        ViewPose(next(poses), best[1], best[2], None if other is None else (next(poses), other[1]))
+        for best, other in found
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,16 +144,17 @@ class Measurements:
 
     def with_views(self, views: Iterable[View]) -> "Measurements":
         """Return the measurements with more views."""
-        kept, poses, rejected = list(self.views), list(self.poses), dict(self.rejected)
+        kept, rejected = list(self.views), dict(self.rejected)
+        found: list[_Found] = []
         for view in views:
             try:
-                pose = view_pose(self.camera, self.target, view)
+                pose = _found(self.camera, self.target, view)
             except HandeyeError as error:
                 rejected[view.name] = error.message.removeprefix(f"view {view.name}: ")
             else:
                 kept.append(view)
-                poses.append(pose)
-        return replace(self, views=tuple(kept), poses=tuple(poses), rejected=rejected)
+                found.append(pose)
+        return replace(self, views=tuple(kept), poses=(*self.poses, *_view_poses(found)), rejected=rejected)
 
     def select(self, indices: Sequence[int]) -> "Measurements":
         """Return the measurements of these views, in this order."""
@@ -181,8 +199,8 @@ class Measurements:
             best, worse = sorted((poses[k], other), key=lambda pose: pose.rmse_px)
             poses[k] = replace(best, mirrored=(worse.T_camera_target, worse.rmse_px))
         near = replace(self, camera=camera, poses=tuple(poses))
-        # Pixels are packed for the core once, whatever camera they are seen through.
-        vars(near)["problem"] = problem
+        # Arrays of the views are made once, whatever camera they are seen through.
+        vars(near).update({name: vars(self)[name] for name in _OF_VIEWS & vars(self).keys()}, problem=problem)
         return near
 
     def __len__(self) -> int:

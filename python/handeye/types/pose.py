@@ -57,13 +57,13 @@ class Pose:
         farthest = float(np.abs(given[:3, 3]).max())
         if farthest > LARGEST:
             raise InputError(f"pose: a translation of {farthest:.3g} m", code=Code.OUT_OF_RANGE)
-        if np.abs(given[:3, :3]).max() < 2 and np.linalg.det(given[:3, :3]) < 0:
-            raise InputError(
-                "pose: a mirrored (left-handed) frame is not a rigid transform",
-                code=Code.NOT_RIGID,
-                hint="check the order and the signs of the axes",
-            )
-        if not _is_rigid(given):
+        if not _core.are_rigid(given[np.newaxis], EXACT_TOLERANCE)[0]:
+            if np.abs(given[:3, :3]).max() < 2 and np.linalg.det(given[:3, :3]) < 0:
+                raise InputError(
+                    "pose: a mirrored (left-handed) frame is not a rigid transform",
+                    code=Code.NOT_RIGID,
+                    hint="check the order and the signs of the axes",
+                )
             given = finite_array(_core.nearest_rigid(_unrounded(given)), (4, 4), "pose")
         self._matrix = given
 
@@ -82,11 +82,7 @@ class Pose:
         2
         """
         given = finite_array(matrices, (None, 4, 4), "poses")
-        rotations = given[:, :3, :3]
-        with np.errstate(over="ignore", invalid="ignore"):
-            deviations = np.abs(rotations.transpose(0, 2, 1) @ rotations - np.eye(3)).max(axis=(1, 2))
-        exact = (deviations <= EXACT_TOLERANCE) & (given[:, 3] == [0, 0, 0, 1]).all(axis=1)
-        exact &= (np.linalg.det(rotations) > 0) & (np.abs(given[:, :3, 3]).max(axis=1) <= LARGEST)
+        exact = _core.are_rigid(given, EXACT_TOLERANCE) & (np.abs(given[:, :3, 3]).max(axis=1) <= LARGEST)
         return [cls._trusted(one.copy()) if ok else cls(one) for one, ok in zip(given, exact, strict=True)]
 
     @classmethod
@@ -300,11 +296,3 @@ def through_twist(points: FloatArray, in_point: FloatArray) -> FloatArray:
         (N, m, 6) derivatives in the twist: metres, radians.
     """
     return np.concatenate([in_point, np.cross(points[:, np.newaxis], in_point)], axis=2)
-
-
-def _is_rigid(matrix: FloatArray) -> bool:
-    """Tell whether a matrix is a rigid transform up to rounding of float64."""
-    rotation = matrix[:3, :3]
-    with np.errstate(over="ignore", invalid="ignore"):
-        deviation = np.abs(rotation.T @ rotation - np.eye(3)).max()
-    return bool(np.array_equal(matrix[3], [0, 0, 0, 1]) and deviation <= EXACT_TOLERANCE)

@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix6, SMatrix};
 
+use crate::batched_algebra::{UPPER, upper};
 use crate::error::Error;
-use crate::least_squares::Side;
-use crate::se3::Se3;
+use crate::least_squares::{Side, through_chain};
+use crate::se3::{Se3, entries};
 
 /// Information of the twists of `X` and `Y`, `sum B' (sigma^2 M^-1 + S)^-1 B` with `B = [I, Ad(X A)]` of each view.
 ///
@@ -28,17 +29,27 @@ pub fn chain_information(
             })?;
             Ok::<_, Error>(factor.inverse())
         };
-        let to_y = forward.adjoint();
         let mut covariance = inverse(*information)? * sigma_px.powi(2);
         if let Some((side, root)) = robot {
-            let moved = if side == Side::Left { left } else { to_y } * root;
+            let moved = if side == Side::Left { left } else { forward.adjoint() } * root;
             covariance += moved * moved.transpose();
         }
         let weight = inverse(covariance)?;
-        let cross = weight * to_y;
-        for (at, part) in [((0, 0), weight), ((0, 6), cross), ((6, 6), to_y.tr_mul(&cross))] {
-            let mut block = sum.fixed_view_mut::<6, 6>(at.0, at.1);
-            block += part;
+        let mut triangle = [0.0; UPPER];
+        for i in 0..6 {
+            for j in i..6 {
+                triangle[upper(i, j)] = weight[(i, j)];
+            }
+        }
+        let through = through_chain(&triangle, &[0.0; 6], &entries(forward));
+        for i in 0..6 {
+            for j in 0..6 {
+                sum[(i, 6 + j)] += through.xy[i][j];
+                if j >= i {
+                    sum[(i, j)] += weight[(i, j)];
+                    sum[(6 + i, 6 + j)] += through.yy[upper(i, j)];
+                }
+            }
         }
     }
     sum.fill_lower_triangle_with_upper_triangle();

@@ -19,6 +19,7 @@ mod chain_information;
 mod component;
 mod components;
 mod degrees_of_freedom;
+mod densities;
 mod descent;
 mod explained;
 mod levels;
@@ -51,6 +52,7 @@ pub use cell::{Body, CameraPrior, Cell, Measurement, SeenBy, Station, Tip, Touch
 pub use cell_start::{CellStart, start_of_cell};
 pub use chain_information::chain_information;
 pub use components::Assumptions;
+pub use densities::log_densities;
 pub use levels::{Level, LevelPrior};
 pub use pixel_field::{SlowResiduals, shared_error};
 pub use pose_measurement::{PoseMeasurement, compress, relative_weights, shrunk_variances};

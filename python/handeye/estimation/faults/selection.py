@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handeye import _core
 from handeye.errors import HandeyeError
 from handeye.estimation.faults.agreement import Agreement, BoolArray, SetFit
 from handeye.estimation.faults.consensus import Consensus
@@ -80,7 +81,7 @@ def mistake_log_density(agreement: Agreement, fit: SetFit) -> FloatArray:
     turns = np.minimum(sizes / MISTAKE_LEVERS_M[:, np.newaxis], LARGEST_MISTAKE_RAD)
     both = np.stack([np.broadcast_to(sizes, turns.shape), turns], axis=-1).reshape(len(deviation), -1, 2)
     variances = np.square(np.repeat(both, 3, axis=2))
-    log_each = _log_gaussian(deviation[:, np.newaxis], covariance[:, np.newaxis] + _diagonal(variances))
+    log_each = _core.log_densities(deviation, covariance, variances)
     return LOG_MISTAKE + np.logaddexp.reduce(log_each, axis=1) - np.log(log_each.shape[1])
 
 
@@ -90,20 +91,8 @@ def member_log_density(agreement: Agreement, fit: SetFit) -> FloatArray:
     translation, rotation = agreement.robot_levels(fit)
     largest = (max(ODD_TRANSLATION_M, ODD_RATIO * translation), max(ODD_ROTATION_RAD, ODD_RATIO * rotation))
     odd = np.square(np.repeat(largest, 3))
-    log_odd = _log_gaussian(deviation, covariance + _diagonal(odd))
-    return np.logaddexp(np.log1p(-ODD_SHARE) + fit.log_density, np.log(ODD_SHARE) + log_odd)
-
-
-def _diagonal(variances: FloatArray) -> FloatArray:
-    return variances[..., np.newaxis] * np.eye(6)
-
-
-def _log_gaussian(deviation: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Logarithm of the density of deviations (..., 6) under covariances (..., 6, 6)."""
-    root = np.linalg.cholesky(covariance)
-    white = np.linalg.solve(root, np.broadcast_to(deviation, root.shape[:-1])[..., np.newaxis])[..., 0]
-    log_root = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
-    return -0.5 * np.square(white).sum(axis=-1) - log_root - 3 * np.log(2 * np.pi)
+    log_odd = _core.log_densities(deviation, covariance, np.broadcast_to(odd, (len(deviation), 1, 6)))
+    return np.logaddexp(np.log1p(-ODD_SHARE) + fit.log_density, np.log(ODD_SHARE) + log_odd[:, 0])
 
 
 def select(stations: Stations, consensus: Consensus) -> Selection:
