@@ -723,7 +723,7 @@ class Posterior:
     def level_names(self) -> list[str]:
         """Names (L) of the levels of noise."""
     @property
-    def levels(self) -> list[list[float]]:
+    def levels(self) -> NDArray[float64]:
         """Levels at each node (N, L), at the mode first."""
     @property
     def mode(self) -> list[float]:

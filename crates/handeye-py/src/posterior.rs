@@ -68,8 +68,10 @@ impl Posterior {
 
     /// Levels at each node (N, L), at the mode first.
     #[getter]
-    fn levels(&self) -> Vec<Vec<f64>> {
-        self.inner.nodes.iter().map(|node| node.levels.clone()).collect()
+    fn levels<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        let nodes = &self.inner.nodes;
+        let entries = nodes.iter().flat_map(|node| node.levels.iter().copied()).collect();
+        convert::array(py, &[nodes.len(), self.inner.level_names.len()], entries)
     }
 
     /// Levels at the mode (L,).
