@@ -136,3 +136,29 @@ fn axis_rotations() -> Vec<Matrix3<f64>> {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Random;
+
+    #[test]
+    fn axes_are_tried_where_no_closed_form_explains_the_poses() {
+        let random = &mut Random::new(12);
+        let (x, y) = (random.transform(0.2, 1.0), random.transform(0.8, 1.0));
+        let mut origin = |turn: f64, wrong: f64| {
+            let motions: Vec<Se3> = (0..8).map(|_| random.transform(0.4, turn)).collect();
+            let poses: Vec<Se3> =
+                motions.iter().map(|a| random.transform(wrong, wrong) * x * *a * y).collect();
+            let covariances = vec![Matrix6::identity() * 1e-6; poses.len()];
+            let found =
+                start_from_poses(&motions, &poses, &covariances, &WeakPrior::default(), None).unwrap();
+            (found.origin, found.cost <= (6 * poses.len()) as f64)
+        };
+        assert_eq!(origin(0.5, 1e-4), ("park_martin", true));
+        // Motions that determine nothing, though all agree.
+        assert_eq!(origin(0.0, 1e-4), ("axes", true));
+        // Poses that no answer explains: whatever fits best.
+        assert!(!origin(0.5, 0.3).1);
+    }
+}
