@@ -49,6 +49,8 @@ class ErrorKind(StrEnum):
     """The same and white errors of the poses, every level drawn for each cell."""
     SAME_PICTURES = "same_pictures"
     """The robot is exact; the camera is calibrated from the very pictures that are solved."""
+    SAME_PICTURES_MIXTURE = "same_pictures_mixture"
+    """The arm is that of `MIXTURE_CELL`; the camera is calibrated from the very pictures that are solved."""
     BOARD_SCALE = "board_scale_0_1_percent"
     """The robot is exact; the board is a thousandth larger than stated."""
     FOCAL = "focal_0_3_percent"
@@ -60,6 +62,7 @@ class ErrorKind(StrEnum):
 
 
 MIXTURES = (ErrorKind.MIXTURE_CELL, ErrorKind.MIXTURE_CELL_2, ErrorKind.MIXTURE_RANDOM)
+OF_THE_SAME_PICTURES = (ErrorKind.SAME_PICTURES, ErrorKind.SAME_PICTURES_MIXTURE)
 FACTORS = {ErrorKind.MIXTURE_CELL_2: 2.0}
 BOARD_SCALE = 1e-3
 FOCAL_SHARE = 3e-3
@@ -165,7 +168,7 @@ def simulate_cell(
     count = int(random.integers(options.views[0], options.views[1] + 1))
     joints, camera_poses = draw_views(random, arm, true_camera, X, Y, count, options)
     mixed = None
-    if kind in MIXTURES:
+    if kind in MIXTURES or kind is ErrorKind.SAME_PICTURES_MIXTURE:
         reported, read = arm.forward(joints), joints
         mixed = draw_mixed(random, kind, arm)
         true = mixed.stand(random, joints)
@@ -189,7 +192,7 @@ def simulate_cell(
         f"simulated {kind.value} {number}",
         options.mounting,
         _calibrated(target, views)
-        if kind is ErrorKind.SAME_PICTURES
+        if kind in OF_THE_SAME_PICTURES
         else Camera(LENS, PARAMETERS, *SIZE_PX, covariance=covariance),
         target,
         tuple(views),

@@ -41,6 +41,7 @@ CASES = (
     *(Case(kind.value, kind, arm_known=True) for kind in MIXTURES),
     *(Case(f"{kind.value}_arm_unknown", kind) for kind in MIXTURES),
     Case("same_pictures", ErrorKind.SAME_PICTURES),
+    Case("same_pictures_mixture", ErrorKind.SAME_PICTURES_MIXTURE, arm_known=True),
     Case("board_scale_0_1_percent", ErrorKind.BOARD_SCALE),
     Case("focal_0_3_percent", ErrorKind.FOCAL),
     Case("pixel_field", ErrorKind.PIXEL_FIELD),
