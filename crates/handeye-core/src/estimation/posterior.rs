@@ -8,7 +8,7 @@ use super::components::{self, Assumptions};
 use super::degrees_of_freedom::degrees_of_freedom;
 use super::linearisation::{Guess, linearise};
 use super::mixed::{Evaluation, Mixed, Wanted};
-use super::nodes::Axes;
+use super::nodes::{self, Axes};
 use super::weak_prior::WeakPrior;
 use crate::error::Error;
 use crate::interrupt;
@@ -305,10 +305,8 @@ fn damped_step(now: &Evaluation, damping: f64, held: &[usize]) -> DVector<f64> {
 
 /// The nodes with their shares, the mode first.
 fn average(mixed: &Mixed, mode: &Mode, at_mode: &Evaluation, pairs: usize) -> Vec<Node> {
-    let fall = |t: &DVector<f64>| {
-        mixed.evaluate(t, Wanted::Value).map_or(f64::INFINITY, |there| there.value - mode.value)
-    };
-    let points = Axes::of(&mode.t, &mode.curvature).measured(fall).points(pairs);
+    let value = |t: &DVector<f64>| mixed.evaluate(t, Wanted::Value).map_or(f64::INFINITY, |at| at.value);
+    let points = Axes::of(&mode.t, &mode.curvature).measured(|t| value(t) - mode.value).points(pairs);
     // Levels at which the model is singular have no share.
     let node = |t: &DVector<f64>, density: f64, answer: &Evaluation| Node {
         weight: mode.value - answer.value - density,
@@ -321,7 +319,7 @@ fn average(mixed: &Mixed, mode: &Mode, at_mode: &Evaluation, pairs: usize) -> Ve
             |(t, density): &(DVector<f64>, f64)| Some(node(t, *density, &mixed.evaluate(t, Wanted::Answer)?));
         points.iter().filter_map(found).collect()
     };
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = *nodes::THREADS;
     let around = &points[1..];
     let (own, others) = around.split_at(around.len().div_ceil(threads));
     let mut nodes = vec![node(&mode.t, points[0].1, at_mode)];
