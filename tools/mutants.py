@@ -177,7 +177,7 @@ ESTIMATION = "crates/handeye-core/src/estimation"
 SQUARES = "crates/handeye-core/src/least_squares"
 POSTERIOR, MIXED, AGREEMENT = (f"{ESTIMATION}/{name}.rs" for name in ("posterior", "mixed", "agreement"))
 CANDIDATE = "crates/handeye-core/src/information/candidate.rs"
-POSE, INTERRUPT = (f"crates/handeye-core/src/{name}.rs" for name in ("pose", "interrupt"))
+POSE, INTERRUPT = (f"crates/handeye-core/src/{name}.rs" for name in ("pose/mod", "interrupt"))
 CHAIN, INVERSE, BATCH = (f"{KINEMATICS}/{name}.rs" for name in ("chain", "inverse", "batch"))
 RUST = (
     Mutant("core: upper limits", CHAIN, "(j.lower..=j.upper).contains(q)", "*q >= j.lower", "kinematics"),
@@ -193,16 +193,18 @@ RUST = (
     Mutant("core: stops where it is told", INTERRUPT, "if ASK.get().is_some_and(|ask| ask()) {", "if false {", "interrupt"),
     Mutant("core: asks nobody afterwards", INTERRUPT, "ASK.set(self.0);", "let _ = self.0;", "interrupt"),
     Mutant("core: checks between many things", INTERRUPT, "if number % STRIDE == 0 {", "if false {", "interrupt"),
-    Mutant("core: what levels explain by chance", MIXED, "constant += factor.log_determinant() - right.dot(&theta);", "constant -= right.dot(&theta);", "estimation"),
-    Mutant("core: noise costs what it widens", MIXED, "        constant += log_determinant;\n        dispatch(self.unit, Accumulate", "        let _ = log_determinant;\n        dispatch(self.unit, Accumulate", "estimation"),
+    Mutant("core: what levels explain by chance", MIXED, "squared + factor.log_determinant() - factor.carried()", "squared - factor.carried()", "estimation"),
+    Mutant("core: noise costs what it widens", MIXED, "self.settled.constant + log_determinant;", "self.settled.constant + 0.0 * log_determinant;", "estimation"),
     Mutant("core: constants cost what they widen", MIXED, "let mut constant = 2.0 * p.count as f64 * s.ln();", "let mut constant = 0.0;", "estimation"),
     Mutant("core: prior of the levels", MIXED, "            value += penalty;\n            slope[i] = first;\n            curvature[(i, i)] = second;", "            let _ = (penalty, first, second);", "estimation"),
     Mutant("core: inflation of a camera's covariance", MIXED, "view += m * weight;", "view += m;", "estimation"),
     Mutant("core: mean of a prior", MIXED, "view += pull;", "let _ = (&mut view, pull);", "estimation"),
-    Mutant("core: recurring errors at a further station", MIXED, ".filter(|(p, _)| p.recurring)", ".filter(|(p, _)| !p.recurring)", "estimation"),
+    Mutant("core: what recurs costs what it widens", MIXED, "2.0 * (FUNCTIONS * p.count) as f64 * s.ln()", "0.0", "estimation"),
     Mutant("core: a camera that is taken at its word", f"{ESTIMATION}/components/camera.rs", "if self.prior.inflated { 0.5 } else { 1e-3 }", "0.5", "estimation"),
-    Mutant("core: shares of the nodes", POSTERIOR, "logs.push(mode.value - answer.value - density);", "logs.push(-density);", "estimation"),
-    Mutant("core: density of the nodes", POSTERIOR, "logs.push(mode.value - answer.value - density);", "logs.push(mode.value - answer.value);", "estimation"),
+    Mutant("core: shares of the nodes", POSTERIOR, "weight: mode.value - answer.value - density,", "weight: -density,", "estimation"),
+    Mutant("core: density of the nodes", POSTERIOR, "weight: mode.value - answer.value - density,", "weight: mode.value - answer.value + 0.0 * density,", "estimation"),
+    Mutant("core: levels are averaged as wide as they are", f"{ESTIMATION}/nodes.rs", "let side = sides[usize::from(way * z > 0.0)];", "let side = 0.5 * (sides[0] + sides[1]);", "estimation"),
+    Mutant("core: a wide side is no denser", f"{ESTIMATION}/nodes.rs", "density -= side.ln();", "density -= 0.0 * side.ln();", "estimation"),
     Mutant("core: answers of the nodes differ", POSTERIOR, "covariance.ger(node.weight, &away, &away, 1.0);", "let _ = away;", "estimation"),
     Mutant("core: degrees of freedom", f"{ESTIMATION}/degrees_of_freedom.rs", "(2.0 * total / spread", "(8.0 * total / spread", "estimation"),
     Mutant("core: fewest degrees of freedom", f"{ESTIMATION}/degrees_of_freedom.rs", "FREEDOM: f64 = 4.5", "FREEDOM: f64 = 1.0", "estimation"),
@@ -212,8 +214,8 @@ RUST = (
     Mutant("core: what others say is not exact", AGREEMENT, "(mean, noise + spread)", "(mean, noise)", "estimation"),
     Mutant("core: gate of the right chi-square", AGREEMENT, "for i in 1..degrees / 2 {", "for i in 1..degrees {", "estimation"),
     Mutant("core: evidence of a set counts its levels", AGREEMENT, "log_evidence: -mode.value - 0.5 * spread", "log_evidence: -mode.value", "estimation"),
-    Mutant("core: noise of the pixels", f"{SQUARES}/accumulate.rs", "let of_view = 1.0 / (sigma * sigma);", "let of_view = 1.0 / sigma;", "least_squares"),
-    Mutant("core: weights of the points", f"{SQUARES}/accumulate.rs", "let weight = of_view * relative;", "let weight = of_view;", ""),
+    Mutant("core: noise of the pixels", f"{SQUARES}/accumulate.rs", "let weight = 1.0 / (sigma * sigma);", "let weight = 1.0 / sigma;", "least_squares"),
+    Mutant("core: weights of the points", f"{ESTIMATION}/pixel_rows.rs", "let root = weight.sqrt();", "let root = weight.sqrt() / weight.sqrt();", "estimation"),
     Mutant("core: an arm that errs, in each view", f"{SQUARES}/marginal.rs", "let h = Matrix6::identity() + ", "let h = Matrix6::identity() * 2.0 + ", ""),
     Mutant("core: fewest views", f"{SQUARES}/problem.rs", "pub const MIN_VIEWS: usize = 3;", "pub const MIN_VIEWS: usize = 2;", "least_squares"),
     Mutant("core: poses that pixels leave open", POSE, "            determined(&sums.information)?;\n            let", "            let", "pose"),

@@ -244,6 +244,16 @@ mod tests {
                     "{lens:?}: {found} {expected}"
                 );
             }
+            // A point counts as its weight says: its squares are summed.
+            let weights: Vec<f64> = (0..21).map(|i| 0.5 + 0.1 * f64::from(i)).collect();
+            let weighted = PixelRows { weights: Some(&weights), ..view }.rows().expect("in sight");
+            for (rows, plain) in weighted.iter().zip(&found) {
+                let width = rows.len() / weights.len();
+                for ((row, plain), weight) in rows.chunks(width).zip(plain.chunks(width)).zip(&weights) {
+                    let squares = |row: &[f64]| row.iter().map(|x| x * x).sum::<f64>();
+                    assert!((squares(row) / squares(plain) - weight).abs() < 1e-12);
+                }
+            }
             let behind = Se3::new(pose.rotation, -pose.translation);
             assert!(PixelRows { pose: &behind, ..view }.rows().is_none());
         }
