@@ -26,6 +26,8 @@ struct Beliefs {
     same_everywhere: f64,
     /// See [`LevelPrior::Deviation`], degrees.
     size_deg: f64,
+    /// The same in a rough arm, per roughness.
+    rough_deg: f64,
     exponent: f64,
     /// Lever that turns the rotation into a translation, metres, and by which factor (natural logarithm) it may differ.
     lever_m: f64,
@@ -33,15 +35,27 @@ struct Beliefs {
 }
 
 /// Wrists are short, and what they hide is small.
-const AT_FLANGE: Beliefs =
-    Beliefs { same_everywhere: 0.5, size_deg: 0.011, exponent: 0.26, lever_m: 0.4, lever_spread: 0.7 };
+const AT_FLANGE: Beliefs = Beliefs {
+    same_everywhere: 0.5,
+    size_deg: 0.011,
+    rough_deg: 0.02,
+    exponent: 0.26,
+    lever_m: 0.4,
+    lever_spread: 0.7,
+};
 /// Shoulders and mountings carry the whole reach.
-const AT_BASE: Beliefs =
-    Beliefs { same_everywhere: 0.9, size_deg: 0.025, exponent: 0.6, lever_m: 1.0, lever_spread: 0.7 };
+const AT_BASE: Beliefs = Beliefs {
+    same_everywhere: 0.9,
+    size_deg: 0.025,
+    rough_deg: 0.025,
+    exponent: 0.6,
+    lever_m: 1.0,
+    lever_spread: 0.7,
+};
 /// Of an arm that is known by a list of poses alone nobody has said that it was ever calibrated, and its pictures, which
 /// would tell what is the detector's, are not there.
-const AT_FLANGE_UNSEEN: Beliefs = Beliefs { size_deg: 0.16, lever_spread: 1.5, ..AT_FLANGE };
-const AT_BASE_UNSEEN: Beliefs = Beliefs { size_deg: 0.08, lever_spread: 1.5, ..AT_BASE };
+const AT_FLANGE_UNSEEN: Beliefs = Beliefs { size_deg: 0.16, rough_deg: 0.16, lever_spread: 1.5, ..AT_FLANGE };
+const AT_BASE_UNSEEN: Beliefs = Beliefs { size_deg: 0.08, rough_deg: 0.08, lever_spread: 1.5, ..AT_BASE };
 /// How surely a rough arm hides errors in proportion to its noise, and the lever of arms as rough: they are small.
 const ROUGH_SPREAD: f64 = 0.4;
 const ROUGH_LEVER_M: f64 = 0.6;
@@ -135,12 +149,13 @@ impl Component for Posture {
 
     fn levels(&self) -> Vec<Level> {
         let degree = 1_f64.to_radians();
-        let (size, nothing) = (self.beliefs.size_deg * degree, 1e-6 * degree);
+        let (size, rough_size) = (self.beliefs.size_deg * degree, self.beliefs.rough_deg * degree);
+        let nothing = 1e-6 * degree;
         let rough = self.roughness > 1.0;
         let level = if rough {
             Level {
                 name: self.levels[0],
-                start: size * self.roughness,
+                start: rough_size * self.roughness,
                 prior: LevelPrior::Known { spread: ROUGH_SPREAD, nothing },
             }
         } else {
