@@ -26,7 +26,7 @@ LAYERS = [
     {"se3"},
     {"imaging", "batched_algebra", "positive"},
     {"simd"},
-    {"error", "interrupt"},
+    {"error", "interrupt", "threads"},
 ]
 # Rooms that tests may use and nothing else.
 FOR_TESTS = {"testing"}

@@ -8,7 +8,14 @@ import pytest
 from handeye import _core
 from handeye.detection import Detection, calibrate_camera
 from handeye.errors import SolveError
-from handeye.simulation.cells import CellOptions, ErrorKind, camera_information, simulate, simulated_arm
+from handeye.simulation.cells import (
+    CellOptions,
+    ErrorKind,
+    camera_information,
+    simulate,
+    simulate_cell,
+    simulated_arm,
+)
 from handeye.types import Camera, Chessboard, Mounting, Pose, Recording
 
 NO_PIXELS = CellOptions(pixel_sigma_px=(1e-9, 1e-9), views=(8, 8))
@@ -130,3 +137,10 @@ def test_camera_information_is_that_of_numerical_derivatives() -> None:
     scale = np.sqrt(np.diag(expected))
     found = camera_information(camera, target, pose.matrix)
     np.testing.assert_allclose(found / np.outer(scale, scale), expected / np.outer(scale, scale), atol=1e-6)
+
+
+def test_a_camera_of_the_same_pictures_is_that_on_an_arm_that_errs_too() -> None:
+    cell = simulate_cell(ErrorKind.SAME_PICTURES_MIXTURE, 0)
+    assert cell.arm is not None
+    assert cell.recording.camera.from_views
+    assert not simulate_cell(ErrorKind.MIXTURE_CELL, 0).recording.camera.from_views

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from handeye.simulation.cells import ErrorKind
+from handeye.errors import InputError
+from handeye.simulation.cells import OF_THE_ARM, ErrorKind
 from handeye.simulation.rigs import RigOptions, simulate_rig
 from handeye.types import Body
 from handeye.types.rig import RigTruth
@@ -32,3 +33,10 @@ def test_pixels_are_those_of_the_truth_where_nothing_is_wrong_but_the_pixels(num
             assert seen.all()
             # The lens is known from a calibration only: a pixel or two.
             assert np.sqrt(np.mean((pixels - view.pixels) ** 2)) < 4.0
+
+
+@pytest.mark.parametrize("kind", sorted(set(ErrorKind) - set(OF_THE_ARM)))
+def test_errors_that_a_rig_does_not_have_are_refused(kind: ErrorKind) -> None:
+    with pytest.raises(InputError, match=kind.value) as refused:
+        simulate_rig(kind, 0)
+    assert "mixture_random" in (refused.value.hint or "")

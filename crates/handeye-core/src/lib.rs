@@ -20,3 +20,4 @@ mod positive;
 pub mod se3;
 pub mod simd;
 pub mod testing;
+mod threads;

@@ -62,6 +62,17 @@ class ErrorKind(StrEnum):
 
 
 MIXTURES = (ErrorKind.MIXTURE_CELL, ErrorKind.MIXTURE_CELL_2, ErrorKind.MIXTURE_RANDOM)
+# Errors of the arm alone, whatever cameras see it by.
+OF_THE_ARM = (
+    ErrorKind.PIXEL_ONLY,
+    ErrorKind.WHITE_FLANGE,
+    ErrorKind.WHITE_BASE,
+    ErrorKind.ENCODER,
+    ErrorKind.JOINT_OFFSETS,
+    ErrorKind.SMOOTH_KINEMATIC,
+    *MIXTURES,
+    ErrorKind.ROBOT_NOISE_1_DEG,
+)
 OF_THE_SAME_PICTURES = (ErrorKind.SAME_PICTURES, ErrorKind.SAME_PICTURES_MIXTURE)
 FACTORS = {ErrorKind.MIXTURE_CELL_2: 2.0}
 BOARD_SCALE = 1e-3

@@ -13,12 +13,13 @@ import numpy as np
 
 from handeye import _core
 from handeye.codes import Code
-from handeye.errors import SolveError
+from handeye.errors import InputError, SolveError
 from handeye.robots import Arm
 from handeye.simulation.cells import (
     LENS,
     MARGIN_PX,
     MIXTURES,
+    OF_THE_ARM,
     PARAMETERS,
     SIZE_PX,
     CellOptions,
@@ -92,11 +93,19 @@ def simulate_rig(
 
     Raises
     ------
+    InputError
+        A kind of error that is not of the arm.
     SolveError
         No stations could be drawn within these options.
     """
     options = options or RigOptions()
     kind = ErrorKind(kind)
+    if kind not in OF_THE_ARM:
+        raise InputError(
+            f"errors {kind.value}: cameras and boards of a rig have none of their own",
+            code=Code.OUT_OF_RANGE,
+            hint=f"choose one of the arm: {', '.join(one.value for one in OF_THE_ARM)}",
+        )
     random = np.random.default_rng([seed, zlib.crc32(f"rig {kind.value}".encode()), number])
     arm = simulated_arm()
     rig = draw_rig(random, options)

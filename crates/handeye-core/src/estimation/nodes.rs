@@ -2,18 +2,14 @@
 //!
 //! The density of the levels is wide on one side and steep on the other: a component that the residuals hardly show may
 //! be anything below where they would. So each axis has a deviation on either side, measured by how far the density falls
-//! there (Rue, Martino and Chopin 2009, section 6.5), and points lie along the axes of random rotations, which fill few
-//! directions more evenly than points drawn one by one (Yu et al., "Orthogonal Random Features", 2016).
-
-use std::sync::LazyLock;
+//! there (Martins et al., "Bayesian computing with INLA: New features", 2013), and points lie along the axes of random
+//! rotations, which fill few directions more evenly than points drawn one by one (Yu et al., "Orthogonal Random
+//! Features", 2016).
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Least curvature that is believed: no level is looked for further than two units of its logarithm away.
 pub(super) const LEAST_CURVATURE: f64 = 0.25;
-/// Threads that nodes are shared among. The system is asked once: it takes a tenth of a millisecond.
-pub(super) static THREADS: LazyLock<usize> =
-    LazyLock::new(|| std::thread::available_parallelism().map_or(1, usize::from));
 /// Where the density is looked at on either side, in deviations.
 const LOOK: f64 = 1.0;
 /// Narrowest and widest side, in deviations.

@@ -8,11 +8,12 @@ use super::components::{self, Assumptions};
 use super::degrees_of_freedom::degrees_of_freedom;
 use super::linearisation::{Guess, linearise};
 use super::mixed::{Evaluation, Mixed, Wanted};
-use super::nodes::{self, Axes};
+use super::nodes::Axes;
 use super::weak_prior::WeakPrior;
 use crate::error::Error;
 use crate::interrupt;
 use crate::se3::Se3;
+use crate::threads;
 
 /// How an estimate is made.
 #[derive(Clone, Debug)]
@@ -319,7 +320,7 @@ fn average(mixed: &Mixed, mode: &Mode, at_mode: &Evaluation, pairs: usize) -> Ve
             |(t, density): &(DVector<f64>, f64)| Some(node(t, *density, &mixed.evaluate(t, Wanted::Answer)?));
         points.iter().filter_map(found).collect()
     };
-    let threads = *nodes::THREADS;
+    let threads = threads::available();
     let around = &points[1..];
     let (own, others) = around.split_at(around.len().div_ceil(threads));
     let mut nodes = vec![node(&mode.t, points[0].1, at_mode)];

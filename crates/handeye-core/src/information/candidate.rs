@@ -9,6 +9,7 @@ use crate::interrupt;
 use crate::least_squares::{Moments, PixelColumns, PixelParameters, ViewBlock, marginalised};
 use crate::se3::Se3;
 use crate::simd::VectorUnit;
+use crate::threads;
 
 /// Which features a candidate is expected to see.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -332,7 +333,7 @@ impl Execution {
     pub(super) fn threads_for(&self, candidates: usize) -> usize {
         let most = (candidates / CANDIDATES_PER_THREAD).max(1);
         match self.threads {
-            0 => std::thread::available_parallelism().map_or(1, usize::from).min(most),
+            0 => threads::available().min(most),
             threads => threads.min(candidates.max(1)),
         }
     }

@@ -26,7 +26,7 @@ struct Beliefs {
     same_everywhere: f64,
     /// See [`LevelPrior::Deviation`], degrees.
     size_deg: f64,
-    /// The same in a rough arm, per roughness.
+    /// About which it is log-normal in a rough arm, per roughness, by `handeye study cheap-arms`.
     rough_deg: f64,
     exponent: f64,
     /// Lever that turns the rotation into a translation, metres, and by which factor (natural logarithm) it may differ.
